@@ -1,1 +1,57 @@
-//! Placeholder.
+//! Least squares and its relatives: parameters of `y = W x + ρ`, their uncertainty, and what the rows do not determine.
+//!
+//! One equation: the running QR `[W | y] -> [R z; 0 e]`, with `‖y - W x‖² = ‖z - R x‖² + e²` for every `x` (Bierman 1977). `W` is
+//! never stored; a log of any length becomes a triangle of a few kilobytes, and triangles merge.
+//!
+//! - [`InformationFactor`] folds rows in; [`solve`] and [`solve_with_known_noise`] read the answer.
+//! - [`weighted_least_squares`] weights the joints by the covariance of their residuals; [`NoiseCovariance`] whitens rows by hand.
+//! - [`ResidualStatistics`] says how well a model predicts, joint by joint.
+//!
+//! ```
+//! use idim_estimation::{InformationFactor, Solution, solve};
+//!
+//! // y = 3 a - b, with a third column that never moves.
+//! let mut factor = InformationFactor::new(3);
+//! for k in 0..100 {
+//!     let (a, b) = (f64::from(k).sin(), f64::from(k).cos());
+//!     factor.push_rows(&[a, b, 0.0], &[3.0 * a - b])?;
+//! }
+//! let Solution::RankDeficient(outcome) = solve(&factor)? else { panic!("column 2 is never excited") };
+//! assert_eq!((outcome.rank, &outcome.undetermined[..]), (2, &[2][..]));
+//! assert_eq!(outcome.values[2], None);
+//!
+//! let Solution::Determined(fit) = solve(&factor.select(&[0, 1]))? else { panic!("the others are") };
+//! assert!((fit.values[0] - 3.0).abs() < 1e-12 && (fit.values[1] + 1.0).abs() < 1e-12);
+//! # Ok::<(), idim_estimation::Error>(())
+//! ```
+//!
+//! It knows no robots: rows come from the caller, `row = sample · n_joints + joint`. It regularises nothing and inverts no singular
+//! matrix in silence.
+
+mod conditioning;
+mod error;
+mod householder;
+mod information;
+mod noise;
+mod rank;
+mod residuals;
+mod sandwich;
+mod solve;
+mod triangular;
+mod weighted;
+
+pub use conditioning::{
+    ConditionNumber, NEAR_SINGULAR_CONDITION, condition_number, matrix_error_bound,
+    observation_error_bound,
+};
+pub use error::{Error, Place};
+pub use information::{InformationFactor, Parts, factor_of};
+pub use noise::{NoiseCovariance, ResidualCovariance};
+pub use rank::{RANK_TOLERANCE, VANISHING_COLUMN};
+pub use residuals::{JointResidual, ResidualStatistics};
+pub use sandwich::sandwich_covariance;
+pub use solve::{Estimate, RankDeficiency, Solution, solve, solve_with_known_noise};
+pub use weighted::{
+    WeightedEstimate, WeightedSolution, Weighting, WeightingOptions, weighted_least_squares,
+    weighted_least_squares_dense,
+};
