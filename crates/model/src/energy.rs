@@ -126,12 +126,12 @@ pub(crate) fn link_energies<T: Lane>(model: &Model, q: &[T], qd: &[T], links: &m
             velocity.linear[k] = axis.linear[k].mul_add(qd[j], velocity.linear[k]);
         }
         let mut potential = below.potential - dot(below.gravity, joint.before.translation());
-        let mut gravity = travel.into_inner(joint.before.into_inner(below.gravity));
+        let mut gravity = travel.to_inner(joint.before.to_inner(below.gravity));
         if let (JointKind::Prismatic, Travel::Slide { d }) = (joint.kind, travel) {
             potential = potential - gravity[2] * d;
         }
         potential = potential - dot(gravity, joint.after.translation());
-        gravity = joint.after.into_inner(gravity);
+        gravity = joint.after.to_inner(gravity);
         all.push(LinkEnergy {
             velocity,
             gravity,

@@ -45,7 +45,7 @@ impl<T: Lane> Travel<T> {
 
     /// `Rᵀ v`.
     #[inline(always)]
-    pub(crate) fn into_inner(self, v: V3<T>) -> V3<T> {
+    pub(crate) fn to_inner(self, v: V3<T>) -> V3<T> {
         match self {
             Self::Turn { s, c } => [
                 c.mul_add(v[0], s * v[1]),
@@ -58,7 +58,7 @@ impl<T: Lane> Travel<T> {
 
     /// `R v`.
     #[inline(always)]
-    pub(crate) fn into_outer(self, v: V3<T>) -> V3<T> {
+    pub(crate) fn to_outer(self, v: V3<T>) -> V3<T> {
         match self {
             Self::Turn { s, c } => [
                 c.mul_add(v[0], -(s * v[1])),
@@ -72,7 +72,7 @@ impl<T: Lane> Travel<T> {
 
 /// `ω̇ × p + ω × (ω × p)`: acceleration of a point of a turning frame.
 #[inline(always)]
-fn turning<T: Lane>(m: &LinkMotion<T>, p: V3<T>) -> V3<T> {
+pub(crate) fn turning<T: Lane>(m: &LinkMotion<T>, p: V3<T>) -> V3<T> {
     add(cross(m.wd, p), cross(m.w, cross(m.w, p)))
 }
 
@@ -90,16 +90,28 @@ impl<T: Lane> LinkMotion<T> {
     /// Motion of the link a joint carries, from that of the link it stands on.
     #[inline(always)]
     pub(crate) fn beyond(&self, joint: &KernelJoint, travel: Travel<T>, qd: T, qdd: T) -> Self {
+        self.carried(joint, travel).moved(joint, travel, qd, qdd)
+    }
+
+    /// Motion of the link below at the joint, in the joint's turned axes; the joint itself held still.
+    #[inline(always)]
+    pub(crate) fn carried(&self, joint: &KernelJoint, travel: Travel<T>) -> Self {
         let mut a = self.a;
         if joint.before.has_translation() {
             a = add(a, turning(self, joint.before.translation()));
         }
-        let inner = |v| travel.into_inner(joint.before.into_inner(v));
-        let mut m = Self {
+        let inner = |v| travel.to_inner(joint.before.to_inner(v));
+        Self {
             w: inner(self.w),
             wd: inner(self.wd),
             a: inner(a),
-        };
+        }
+    }
+
+    /// The joint's own motion on top of what carries it, at the link's frame.
+    #[inline(always)]
+    pub(crate) fn moved(self, joint: &KernelJoint, travel: Travel<T>, qd: T, qdd: T) -> Self {
+        let mut m = self;
         match travel {
             Travel::Turn { .. } => {
                 // ω × z q̇, then the joint's own motion about z.
@@ -121,11 +133,11 @@ impl<T: Lane> LinkMotion<T> {
         if joint.after.has_translation() {
             m.a = add(m.a, turning(&m, joint.after.translation()));
         }
-        m.map(|v| joint.after.into_inner(v))
+        m.map(|v| joint.after.to_inner(v))
     }
 
     #[inline(always)]
-    fn map(self, f: impl Fn(V3<T>) -> V3<T>) -> Self {
+    pub(crate) fn map(self, f: impl Fn(V3<T>) -> V3<T>) -> Self {
         Self {
             w: f(self.w),
             wd: f(self.wd),
@@ -145,8 +157,8 @@ impl<T: Lane> Screw<T> {
             JointKind::Prismatic => (zero(), z),
         };
         Self {
-            angular: joint.after.into_inner(angular),
-            linear: joint.after.into_inner(linear),
+            angular: joint.after.to_inner(angular),
+            linear: joint.after.to_inner(linear),
         }
     }
 
@@ -154,7 +166,7 @@ impl<T: Lane> Screw<T> {
     #[inline(always)]
     pub(crate) fn beyond(&self, joint: &KernelJoint, travel: Travel<T>) -> Self {
         let shifted = joint.before.shift(self.linear, self.angular);
-        let inner = |v| travel.into_inner(joint.before.into_inner(v));
+        let inner = |v| travel.to_inner(joint.before.to_inner(v));
         let angular = inner(self.angular);
         let mut linear = inner(shifted);
         if let Travel::Slide { d } = travel {
@@ -162,22 +174,22 @@ impl<T: Lane> Screw<T> {
             linear[1] = angular[0].mul_add(-d, linear[1]);
         }
         Self {
-            angular: joint.after.into_inner(angular),
-            linear: joint.after.into_inner(joint.after.shift(linear, angular)),
+            angular: joint.after.to_inner(angular),
+            linear: joint.after.to_inner(joint.after.shift(linear, angular)),
         }
     }
 
     /// A wrench (moment, force) at the link the joint carries, at the link below.
     #[inline(always)]
     pub(crate) fn wrench_below(&self, joint: &KernelJoint, travel: Travel<T>) -> Self {
-        let force = joint.after.into_outer(self.linear);
-        let moment = arm(&joint.after, joint.after.into_outer(self.angular), force);
+        let force = joint.after.to_outer(self.linear);
+        let moment = arm(&joint.after, joint.after.to_outer(self.angular), force);
         let (mut moment, force) = (moment, force);
         if let Travel::Slide { d } = travel {
             moment[0] = force[1].mul_add(-d, moment[0]);
             moment[1] = force[0].mul_add(d, moment[1]);
         }
-        let outer = |v| joint.before.into_outer(travel.into_outer(v));
+        let outer = |v| joint.before.to_outer(travel.to_outer(v));
         let force = outer(force);
         Self {
             angular: arm(&joint.before, outer(moment), force),

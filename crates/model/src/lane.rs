@@ -98,7 +98,7 @@ impl Lane for F64x8 {
             (s[k], c[k]) = sin_cos_reduced(self.0[k]);
         }
         // A branch a lane would break the vector code; angles this large are rare, and done again one by one.
-        if self.0.iter().any(|x| !(x.abs() <= REDUCTION_LIMIT)) {
+        if !self.0.iter().all(|x| x.abs() <= REDUCTION_LIMIT) {
             for k in 0..8 {
                 (s[k], c[k]) = Lane::sin_cos(self.0[k]);
             }
@@ -115,7 +115,7 @@ impl Lane for F64x8 {
 const REDUCTION_LIMIT: f64 = 1.0e6;
 /// π/2 in three parts of 53 bits each; their fused products leave the reduced angle correct to its last bit.
 const HALF_PI: [f64; 3] = [
-    1.570_796_326_794_896_6,
+    std::f64::consts::FRAC_PI_2,
     6.123_233_995_736_766e-17,
     -1.497_384_904_859_169_8e-33,
 ];

@@ -26,8 +26,12 @@
 //!
 //! What it does not do: rank decisions (`idim-base-params`), trajectories, estimation, file access.
 
+mod adjoint;
 mod energy;
 mod error;
+mod gradient;
+#[cfg(test)]
+mod gradient_identities;
 #[cfg(test)]
 mod identities;
 mod kinematics;
@@ -45,6 +49,9 @@ mod testing;
 
 pub use energy::{energy_difference, energy_regressor, momentum_regressor, power_regressor};
 pub use error::Error;
+pub use gradient::{
+    regressor_contraction_gradient, squared_torque_gradient, torque_contraction_gradient,
+};
 pub use model::Model;
 pub use newton_euler::{inverse_dynamics, inverse_dynamics_batch};
 pub use parameter::{

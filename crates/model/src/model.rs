@@ -73,7 +73,7 @@ impl FixedPose {
 
     /// `Rᵀ v`: a vector of the outer frame in the inner one.
     #[inline(always)]
-    pub(crate) fn into_inner<T: Lane>(&self, v: V3<T>) -> V3<T> {
+    pub(crate) fn to_inner<T: Lane>(&self, v: V3<T>) -> V3<T> {
         match &self.rotation {
             FixedRotation::Identity => v,
             FixedRotation::QuarterX => [v[0], v[2], -v[1]],
@@ -87,7 +87,7 @@ impl FixedPose {
 
     /// `R v`: a vector of the inner frame in the outer one.
     #[inline(always)]
-    pub(crate) fn into_outer<T: Lane>(&self, v: V3<T>) -> V3<T> {
+    pub(crate) fn to_outer<T: Lane>(&self, v: V3<T>) -> V3<T> {
         match &self.rotation {
             FixedRotation::Identity => v,
             FixedRotation::QuarterX => [v[0], -v[2], v[1]],

@@ -34,7 +34,7 @@ pub fn inverse_dynamics(model: &Model, parameters: &[f64], state: &JointState) -
                 &state.qdd,
                 &mut work,
                 &mut torque,
-            )
+            );
         },
     );
     torque
@@ -64,7 +64,7 @@ pub fn inverse_dynamics_batch(model: &Model, parameters: &[f64], states: &JointS
             || {
                 recursion(
                     model, parameters, &lanes.q, &lanes.qd, &lanes.qdd, &mut work, &mut out,
-                )
+                );
             },
         );
         let count = (n_samples - first).min(8);
@@ -110,7 +110,7 @@ impl LaneStates {
     }
 }
 
-fn eight(x: &[f64], first: usize) -> F64x8 {
+pub(crate) fn eight(x: &[f64], first: usize) -> F64x8 {
     if let Some(full) = x[first..].first_chunk::<8>() {
         return F64x8(*full);
     }
@@ -154,7 +154,7 @@ fn recursion<T: Lane>(
         let travel = Travel::new(joint.kind, q[j]);
         let below = joint.parent.map_or(base, |p| work.motion[p]);
         let motion = below.beyond(joint, travel, qd[j], qdd[j]);
-        work.wrench[j] = link_wrench(&motion, &parameters[10 * j..10 * j + 10]);
+        work.wrench[j] = link_wrench(&motion, &splat_ten(&parameters[10 * j..]));
         work.motion[j] = motion;
         work.travel[j] = travel;
     }
@@ -172,10 +172,15 @@ fn recursion<T: Lane>(
     }
 }
 
+/// The ten parameters of a link in every lane.
+#[inline(always)]
+pub(crate) fn splat_ten<T: Lane>(parameters: &[f64]) -> [T; 10] {
+    std::array::from_fn(|k| T::splat(parameters[k]))
+}
+
 /// Newton and Euler about the frame's origin: `n = I ω̇ + ω × I ω + h × a`, `f = m a + ω̇ × h + ω × (ω × h)`.
 #[inline(always)]
-fn link_wrench<T: Lane>(m: &LinkMotion<T>, parameters: &[f64]) -> Screw<T> {
-    let p: [T; 10] = std::array::from_fn(|k| T::splat(parameters[k]));
+pub(crate) fn link_wrench<T: Lane>(m: &LinkMotion<T>, p: &[T; 10]) -> Screw<T> {
     let tensor = |v: V3<T>| -> V3<T> {
         [
             dot([p[0], p[1], p[2]], v),

@@ -76,6 +76,7 @@ impl InertialParameters {
     }
 
     /// The same body expressed in another frame, `to_from_here`.
+    #[must_use]
     pub fn expressed_in(&self, to_from_here: &Pose) -> Self {
         let (r, p) = (&to_from_here.rotation, &to_from_here.translation);
         let m = self.mass();
@@ -226,6 +227,8 @@ impl fmt::Display for Parameter {
 }
 
 /// Which drive columns stand beside the inertial ones.
+// Each column is there or not, independently.
+#[allow(clippy::struct_excessive_bools)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DriveColumns {
     /// `Ia · q̈`.

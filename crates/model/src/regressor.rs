@@ -42,7 +42,7 @@ pub fn torque_regressor(model: &Model, columns: &Columns, state: &JointState) ->
                 &mut motions,
                 &mut axes,
                 &mut rows,
-            )
+            );
         },
     );
     DMatrix::from_row_slice(n, columns.len(), &rows)
@@ -61,6 +61,30 @@ pub struct RegressorBlock {
 impl RegressorBlock {
     /// Samples side by side in a full block.
     pub const LANES: usize = 8;
+
+    pub(crate) fn new(n_joints: usize, n_columns: usize) -> Self {
+        Self {
+            first_sample: 0,
+            n_samples: 0,
+            n_joints,
+            n_columns,
+            entries: vec![F64x8::ZERO; n_joints * n_columns],
+        }
+    }
+
+    /// Takes the block to the samples from `first` on, of `n_samples` in all.
+    pub(crate) fn move_to(&mut self, first: usize, n_samples: usize) {
+        self.first_sample = first;
+        self.n_samples = (n_samples - first).min(Self::LANES);
+    }
+
+    pub(crate) fn entries(&self) -> &[F64x8] {
+        &self.entries
+    }
+
+    pub(crate) fn entries_mut(&mut self) -> &mut [F64x8] {
+        &mut self.entries
+    }
 
     /// Number of the block's first sample.
     pub fn first_sample(&self) -> usize {
@@ -85,6 +109,11 @@ impl RegressorBlock {
     /// One entry of the regressor for the eight samples; beyond `n_samples` the last sample is repeated.
     pub fn lanes(&self, joint: usize, column: usize) -> &[f64; 8] {
         &self.entries[joint * self.n_columns + column].0
+    }
+
+    /// One entry for the eight samples, to fill in: of a block of weights.
+    pub fn lanes_mut(&mut self, joint: usize, column: usize) -> &mut [f64; 8] {
+        &mut self.entries[joint * self.n_columns + column].0
     }
 
     /// One row of one sample.
@@ -122,16 +151,9 @@ pub fn visit_torque_regressor(
     let mut lanes = LaneStates::new(n);
     let mut axes = vec![no_axis(); n * n];
     let mut motions = vec![LinkMotion::base(model); n];
-    let mut block = RegressorBlock {
-        first_sample: 0,
-        n_samples: 0,
-        n_joints: n,
-        n_columns: columns.len(),
-        entries: vec![F64x8::ZERO; n * columns.len()],
-    };
+    let mut block = RegressorBlock::new(n, columns.len());
     for first in (0..states.n_samples()).step_by(RegressorBlock::LANES) {
-        block.first_sample = first;
-        block.n_samples = (states.n_samples() - first).min(RegressorBlock::LANES);
+        block.move_to(first, states.n_samples());
         lanes.load(states, first);
         pulp::Arch::new().dispatch(
             #[inline(always)]
@@ -176,11 +198,11 @@ pub fn observation_matrix(model: &Model, columns: &Columns, states: &JointStates
 
 /// Which entry of which link goes to which column, found once.
 pub(crate) struct Plan {
-    n_columns: usize,
+    pub(crate) n_columns: usize,
     /// For each link: (position among the ten, column).
-    links: Vec<Vec<(usize, usize)>>,
+    pub(crate) links: Vec<Vec<(usize, usize)>>,
     /// For each joint: (drive kind, column).
-    drives: Vec<Vec<(ParameterKind, usize)>>,
+    pub(crate) drives: Vec<Vec<(ParameterKind, usize)>>,
 }
 
 impl Plan {
@@ -206,7 +228,7 @@ impl Plan {
     }
 }
 
-fn no_axis<T: Lane>() -> Screw<T> {
+pub(crate) fn no_axis<T: Lane>() -> Screw<T> {
     Screw {
         angular: [T::splat(0.0); 3],
         linear: [T::splat(0.0); 3],
@@ -215,7 +237,7 @@ fn no_axis<T: Lane>() -> Screw<T> {
 
 /// Writes the entries that can be other than zero; `rows` is `n × p`, joint by joint.
 #[inline(always)]
-fn fill<T: Lane>(
+pub(crate) fn fill<T: Lane>(
     model: &Model,
     plan: &Plan,
     [q, qd, qdd]: [&[T]; 3],

@@ -1,0 +1,367 @@
+//! Exact gradients with respect to the states of scalars linear in the torque regressor, in reverse mode.
+//!
+//! Every criterion of an excitation is a function of `Σ Yᵀ D Y`; its derivative contracts each sample's `dY` with known
+//! weights. A twist made of the weights goes out along the chain, wrenches and derivatives come back: about three inverse
+//! dynamics for all derivatives of a sample, and no derivative of Y is ever formed.
+
+use crate::adjoint::{JointBar, beyond_bar, wrench_bar};
+use crate::kinematics::{LinkMotion, Screw, Travel};
+use crate::lane::{F64x8, Lane, zero};
+use crate::model::Model;
+use crate::newton_euler::{LaneStates, eight, link_wrench, splat_ten};
+use crate::parameter::{Columns, ParameterKind};
+use crate::regressor::{Plan, RegressorBlock, fill, no_axis};
+use crate::states::JointStates;
+
+/// Gradient of `Σ_t u_t · Y(q_t, q̇_t, q̈_t) v` with respect to every `q`, `q̇`, `q̈`, in the shape of the states.
+///
+/// `u`: one weight a joint and sample, joint by joint as the states; `v`: one number a column. The Coulomb and offset
+/// columns have no derivative.
+///
+/// # Panics
+/// If a shape does not fit the model.
+#[track_caller]
+pub fn torque_contraction_gradient(
+    model: &Model,
+    columns: &Columns,
+    states: &JointStates,
+    u: &[f64],
+    v: &[f64],
+) -> JointStates {
+    let (n, n_samples) = (model.n_joints(), states.n_samples());
+    assert_eq!(u.len(), n * n_samples, "u is not joints × samples");
+    let terms = [Term::new(model, columns, v)];
+    let mut weights = vec![F64x8::ZERO; n];
+    over_lanes(model, states, |first, lanes, work| {
+        for j in 0..n {
+            weights[j] = eight(&u[j * n_samples..][..n_samples], first);
+        }
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || contract_torque(model, &terms, lanes, work, |_, joint, _| weights[joint]),
+        );
+    })
+}
+
+/// Gradient of `½ Σ_t Σ_k c_k Σ_j d_j (Y_t v_k)_j²`: of the quadratic form `½ Σ_k c_k v_kᵀ (Σ_t Y_tᵀ D Y_t) v_k`.
+///
+/// `terms`: pairs `(c_k, v_k)` of a factor and one number a column; `joint_weights`: the diagonal `d` of `D`, one a joint.
+/// The derivative of an eigenvalue of the information matrix is twice this with its unit eigenvector.
+///
+/// # Panics
+/// If a shape does not fit the model.
+#[track_caller]
+pub fn squared_torque_gradient(
+    model: &Model,
+    columns: &Columns,
+    states: &JointStates,
+    joint_weights: &[f64],
+    terms: &[(f64, &[f64])],
+) -> JointStates {
+    let n = model.n_joints();
+    assert_eq!(joint_weights.len(), n, "one weight a joint");
+    let factors: Vec<f64> = terms
+        .iter()
+        .flat_map(|(c, _)| joint_weights.iter().map(move |d| c * d))
+        .collect();
+    let terms: Vec<Term> = terms
+        .iter()
+        .map(|(_, v)| Term::new(model, columns, v))
+        .collect();
+    over_lanes(model, states, |_, lanes, work| {
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                contract_torque(model, &terms, lanes, work, |term, joint, torque| {
+                    torque * F64x8::splat(factors[term * n + joint])
+                });
+            },
+        );
+    })
+}
+
+/// Gradient of `Σ_t ⟨G_t, Y_t⟩` with weights `G_t` (`n × p`) that `weigh(Y_t, G_t)` writes from the regressor, eight
+/// samples at a time and in order.
+///
+/// The block of weights keeps what the call before left in it; entries of the links outside a joint's path are not read.
+///
+/// # Panics
+/// If the states or a column do not fit the model.
+#[track_caller]
+pub fn regressor_contraction_gradient(
+    model: &Model,
+    columns: &Columns,
+    states: &JointStates,
+    mut weigh: impl FnMut(&RegressorBlock, &mut RegressorBlock),
+) -> JointStates {
+    let n = model.n_joints();
+    let plan = Plan::new(model, columns);
+    let mut y = RegressorBlock::new(n, columns.len());
+    let mut g = y.clone();
+    let mut axes = vec![no_axis(); n * n];
+    let mut motions = vec![LinkMotion::base(model); n];
+    over_lanes(model, states, |first, lanes, work| {
+        y.move_to(first, states.n_samples());
+        g.move_to(first, states.n_samples());
+        let state = [&lanes.q[..], &lanes.qd, &lanes.qdd];
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || {
+                fill(
+                    model,
+                    &plan,
+                    state,
+                    &mut motions,
+                    &mut axes,
+                    y.entries_mut(),
+                );
+            },
+        );
+        weigh(&y, &mut g);
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || contract_regressor(model, &plan, state, &axes, g.entries(), work),
+        );
+    })
+}
+
+/// Runs over the samples eight at a time and collects what `work.out` holds after each.
+#[track_caller]
+fn over_lanes(
+    model: &Model,
+    states: &JointStates,
+    mut contract: impl FnMut(usize, &LaneStates, &mut Workspace<F64x8>),
+) -> JointStates {
+    let (n, n_samples) = (model.n_joints(), states.n_samples());
+    assert_eq!(
+        states.n_joints(),
+        n,
+        "the states have another number of joints than the model"
+    );
+    let mut gradient = JointStates::zeros(n, n_samples);
+    let mut work = Workspace::new(model);
+    let mut lanes = LaneStates::new(n);
+    for first in (0..n_samples).step_by(8) {
+        lanes.load(states, first);
+        contract(first, &lanes, &mut work);
+        let here = first..n_samples.min(first + 8);
+        let count = here.len();
+        for (j, bar) in work.out.iter().enumerate() {
+            gradient.q_mut(j)[here.clone()].copy_from_slice(&bar.q.0[..count]);
+            gradient.qd_mut(j)[here.clone()].copy_from_slice(&bar.qd.0[..count]);
+            gradient.qdd_mut(j)[here.clone()].copy_from_slice(&bar.qdd.0[..count]);
+        }
+    }
+    gradient
+}
+
+/// One number a column, sorted to where the recursion wants it.
+struct Term {
+    /// Ten a link.
+    inertial: Vec<f64>,
+    /// For each joint: rotor inertia, viscous and Coulomb friction, offset.
+    drive: Vec<[f64; 4]>,
+}
+
+impl Term {
+    #[track_caller]
+    fn new(model: &Model, columns: &Columns, v: &[f64]) -> Self {
+        let n = model.n_joints();
+        assert_eq!(v.len(), columns.len(), "v has one number a column");
+        let mut term = Self {
+            inertial: vec![0.0; 10 * n],
+            drive: vec![[0.0; 4]; n],
+        };
+        for (p, x) in columns.0.iter().zip(v) {
+            assert!(
+                p.index < n,
+                "column {p} names a link the model does not have"
+            );
+            match p.kind.inertial_index() {
+                Some(k) => term.inertial[10 * p.index + k] += x,
+                None => term.drive[p.index][drive_position(p.kind)] += x,
+            }
+        }
+        term
+    }
+
+    #[inline(always)]
+    fn drive_torque<T: Lane>(&self, joint: usize, qd: T, qdd: T) -> T {
+        let [rotor, viscous, coulomb, offset] = self.drive[joint].map(T::splat);
+        let friction = viscous.mul_add(qd, coulomb.mul_add(qd.sign(), offset));
+        rotor.mul_add(qdd, friction)
+    }
+}
+
+fn drive_position(kind: ParameterKind) -> usize {
+    match kind {
+        ParameterKind::Ia => 0,
+        ParameterKind::Fv => 1,
+        ParameterKind::Fc => 2,
+        _ => 3,
+    }
+}
+
+struct Workspace<T> {
+    travel: Vec<Travel<T>>,
+    /// Motion at each joint, the joint held still; and of each link.
+    carried: Vec<LinkMotion<T>>,
+    motion: Vec<LinkMotion<T>>,
+    /// Derivative with respect to `motion`.
+    bar: Vec<LinkMotion<T>>,
+    wrench: Vec<Screw<T>>,
+    twist: Vec<Screw<T>>,
+    out: Vec<JointBar<T>>,
+}
+
+impl<T: Lane> Workspace<T> {
+    fn new(model: &Model) -> Self {
+        let n = model.n_joints();
+        Self {
+            travel: vec![Travel::Slide { d: T::splat(0.0) }; n],
+            carried: vec![LinkMotion::zero(); n],
+            motion: vec![LinkMotion::zero(); n],
+            bar: vec![LinkMotion::zero(); n],
+            wrench: vec![no_axis(); n],
+            twist: vec![no_axis(); n],
+            out: vec![JointBar::zero(); n],
+        }
+    }
+
+    /// Motions of all links; derivatives start from zero.
+    #[inline(always)]
+    fn outward(&mut self, model: &Model, [q, qd, qdd]: [&[T]; 3]) {
+        let base = LinkMotion::base(model);
+        for (j, joint) in model.joints.iter().enumerate() {
+            let travel = Travel::new(joint.kind, q[j]);
+            let below = joint.parent.map_or(base, |p| self.motion[p]);
+            self.travel[j] = travel;
+            self.carried[j] = below.carried(joint, travel);
+            self.motion[j] = self.carried[j].moved(joint, travel, qd[j], qdd[j]);
+            self.bar[j] = LinkMotion::zero();
+            self.out[j] = JointBar::zero();
+        }
+    }
+
+    /// Hands the derivatives of the motions back to the joints.
+    #[inline(always)]
+    fn inward(&mut self, model: &Model, qd: &[T]) {
+        for (j, joint) in model.joints.iter().enumerate().rev() {
+            let below_w = joint.parent.map_or(zero(), |p| self.motion[p].w);
+            let at_joint = (qd[j], &self.carried[j], below_w);
+            let bar = beyond_bar(
+                joint,
+                self.travel[j],
+                at_joint,
+                self.bar[j],
+                &mut self.out[j],
+            );
+            if let Some(p) = joint.parent {
+                self.bar[p] = self.bar[p].plus(&bar);
+            }
+        }
+    }
+}
+
+/// `weight(term, joint, torque)` is u; it may depend on the torque `Y v` itself.
+#[inline(always)]
+fn contract_torque(
+    model: &Model,
+    terms: &[Term],
+    lanes: &LaneStates,
+    work: &mut Workspace<F64x8>,
+    weight: impl Fn(usize, usize, F64x8) -> F64x8,
+) {
+    let state = [&lanes.q[..], &lanes.qd, &lanes.qdd];
+    contract_torque_of(model, terms, state, work, weight);
+}
+
+#[inline(always)]
+fn contract_torque_of<T: Lane>(
+    model: &Model,
+    terms: &[Term],
+    [q, qd, qdd]: [&[T]; 3],
+    work: &mut Workspace<T>,
+    weight: impl Fn(usize, usize, T) -> T,
+) {
+    let n = model.n_joints();
+    work.outward(model, [q, qd, qdd]);
+    for (t, term) in terms.iter().enumerate() {
+        // Wrench of everything a joint carries, by the parameters v.
+        for j in 0..n {
+            work.wrench[j] = link_wrench(&work.motion[j], &splat_ten(&term.inertial[10 * j..]));
+        }
+        for (j, joint) in model.joints.iter().enumerate().rev() {
+            if let Some(p) = joint.parent {
+                let passed = work.wrench[j].wrench_below(joint, work.travel[j]);
+                work.wrench[p] = work.wrench[p].plus(&passed);
+            }
+        }
+        // Twist of every link if the joints had the speeds u.
+        for (j, joint) in model.joints.iter().enumerate() {
+            let axis = Screw::axis(joint);
+            let torque = axis.power(&work.wrench[j]) + term.drive_torque(j, qd[j], qdd[j]);
+            let u = weight(t, j, torque);
+            let own = axis.times(u);
+            let twist = match joint.parent {
+                Some(p) => work.twist[p].beyond(joint, work.travel[j]).plus(&own),
+                None => own,
+            };
+            let out = &mut work.out[j];
+            out.q = out.q - axis.power(&twist.cross_wrench(&work.wrench[j]));
+            out.qd = T::splat(term.drive[j][1]).mul_add(u, out.qd);
+            out.qdd = T::splat(term.drive[j][0]).mul_add(u, out.qdd);
+            let own_bar = wrench_bar(
+                &work.motion[j],
+                &twist,
+                &splat_ten(&term.inertial[10 * j..]),
+            );
+            work.bar[j] = work.bar[j].plus(&own_bar);
+            work.twist[j] = twist;
+        }
+    }
+    work.inward(model, qd);
+}
+
+/// `axes` and `weights` as `fill` lays them out.
+#[inline(always)]
+fn contract_regressor<T: Lane>(
+    model: &Model,
+    plan: &Plan,
+    state: [&[T]; 3],
+    axes: &[Screw<T>],
+    weights: &[T],
+    work: &mut Workspace<T>,
+) {
+    let n = model.n_joints();
+    let p = plan.n_columns;
+    work.outward(model, state);
+    for (j, joint) in model.joints.iter().enumerate() {
+        let mut below: Screw<T> = no_axis();
+        for &i in &joint.path {
+            if plan.links[j].is_empty() {
+                break;
+            }
+            let mut parameters = [T::splat(0.0); 10];
+            for &(k, column) in &plan.links[j] {
+                parameters[k] = parameters[k] + weights[i * p + column];
+            }
+            let axis = axes[j * n + i];
+            let wrench = link_wrench(&work.motion[j], &parameters);
+            // A turn of joint i moves the axes below it as this link sees them.
+            work.out[i].q = work.out[i].q - axis.power(&below);
+            below = below.plus(&axis.cross_wrench(&wrench));
+            work.bar[j] = work.bar[j].plus(&wrench_bar(&work.motion[j], &axis, &parameters));
+        }
+        for &(kind, column) in &plan.drives[j] {
+            let weight = weights[j * p + column];
+            let out = &mut work.out[j];
+            match kind {
+                ParameterKind::Ia => out.qdd = out.qdd + weight,
+                ParameterKind::Fv => out.qd = out.qd + weight,
+                _ => {}
+            }
+        }
+    }
+    work.inward(model, state[1]);
+}
