@@ -2,6 +2,15 @@
 
 use faer::Mat;
 
+/// A column in terms of kept columns.
+#[derive(Clone)]
+pub(crate) struct Relation {
+    /// One coefficient for each of the kept columns, or for the first of them.
+    pub(crate) coefficients: Vec<f64>,
+    /// Norm of what they leave of the column.
+    pub(crate) residual: f64,
+}
+
 /// Columns kept so far, orthonormalised, and the relations of those that depend on them.
 ///
 /// Source: Gautier 1991; Gram-Schmidt with a second pass, which keeps the basis orthogonal to rounding
@@ -9,8 +18,8 @@ use faer::Mat;
 pub(crate) struct KeptColumns {
     /// Position of each kept column in the list handed in.
     pub(crate) kept: Vec<usize>,
-    /// For each dependent position its coefficients on the columns kept before it.
-    pub(crate) dependent: Vec<(usize, Vec<f64>)>,
+    /// The others, with their relations.
+    pub(crate) dependent: Vec<(usize, Relation)>,
     /// Orthonormal basis of the kept columns.
     basis: Vec<Vec<f64>>,
     /// Whether a column was refused only because `limit` were kept already.
@@ -44,8 +53,14 @@ impl KeptColumns {
                 result.basis.push(residual);
                 result.triangle.push(projection);
             } else {
-                let relation = result.solve(projection);
-                result.dependent.push((position, relation));
+                let coefficients = result.solve(projection);
+                result.dependent.push((
+                    position,
+                    Relation {
+                        coefficients,
+                        residual: norm,
+                    },
+                ));
             }
         }
         result
@@ -67,10 +82,13 @@ impl KeptColumns {
         (projection, residual)
     }
 
-    /// Coefficients of a column on the kept columns, and the norm of what they leave.
-    pub(crate) fn relation(&self, column: &[f64]) -> (Vec<f64>, f64) {
+    /// A column in terms of the kept columns.
+    pub(crate) fn relation(&self, column: &[f64]) -> Relation {
         let (projection, residual) = self.project(column);
-        (self.solve(projection), dot(&residual, &residual).sqrt())
+        Relation {
+            coefficients: self.solve(projection),
+            residual: dot(&residual, &residual).sqrt(),
+        }
     }
 
     /// From coefficients on the basis to coefficients on the kept columns.

@@ -97,14 +97,6 @@ pub(crate) fn condition(matrix: MatRef<'_, f64>) -> f64 {
     values[0] / values[values.len() - 1]
 }
 
-/// Right singular vector of the value at `index` (from 0, falling).
-pub(crate) fn right_singular_vector(matrix: MatRef<'_, f64>, index: usize) -> Vec<f64> {
-    let svd = matrix
-        .thin_svd()
-        .expect("singular values of a finite matrix converge");
-    svd.V().col(index).iter().copied().collect()
-}
-
 /// Singular values, falling.
 pub(crate) fn singular_values(matrix: MatRef<'_, f64>) -> Vec<f64> {
     matrix

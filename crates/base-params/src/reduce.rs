@@ -2,8 +2,8 @@
 
 use faer::{Mat, MatRef};
 
-use crate::independent::{KeptColumns, dot};
-use crate::rank::{Rank, condition, rank, right_singular_vector, scaled_columns, singular_values};
+use crate::independent::{KeptColumns, Relation, dot};
+use crate::rank::{Rank, condition, rank, scaled_columns, singular_values};
 use crate::{Ambiguity, Ghost, Reduction, TriangularFactor};
 
 /// A column below this share of the largest vanishes.
@@ -15,6 +15,9 @@ pub(crate) const VANISHED: f64 = 1e-10;
 const ZERO_COEFFICIENT: f64 = 1e-12;
 /// Relative error of a least-squares solution per unit of condition number, generously.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
+
+/// Coefficients below this multiple of the residuals are in doubt as much as the columns are.
+const DOUBT_MARGIN: f64 = 10.0;
 
 /// What it takes for a column and for a rank to be accepted.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,7 +88,7 @@ pub fn reduce(factor: &TriangularFactor, order: &[usize], options: &ReductionOpt
     rank.lower = kept.kept.len();
     let base_condition = condition(kept.triangle().as_ref());
 
-    let mut relations: Vec<(usize, Vec<f64>)> = kept
+    let mut relations: Vec<(usize, Relation)> = kept
         .dependent
         .iter()
         .map(|(position, relation)| (columns.significant[*position], relation.clone()))
@@ -98,8 +101,19 @@ pub fn reduce(factor: &TriangularFactor, order: &[usize], options: &ReductionOpt
         .iter()
         .map(|position| columns.significant[*position])
         .collect();
-    let zero = ZERO_COEFFICIENT.max(ROUNDING * base_condition);
+    let doubt = doubt(&relations, &ghosts).min(options.significance / base_condition);
+    let zero = ZERO_COEFFICIENT.max(base_condition * doubt.max(ROUNDING));
     let regrouping = regrouping(n, &base, &relations, &columns.norms, zero);
+    let ambiguity = ambiguity(
+        &rank,
+        &columns,
+        &regrouping,
+        &base,
+        &relations,
+        &ghosts,
+        factor,
+    );
+
     let is_combined = |j: &usize| relations.iter().any(|relation| relation.0 == *j);
     let is_alone = |b: &usize| (0..n).filter(|j| regrouping[(*b, *j)] != 0.0).count() == 1;
     Reduction {
@@ -112,7 +126,7 @@ pub fn reduce(factor: &TriangularFactor, order: &[usize], options: &ReductionOpt
         identifiable_alone: (0..base.len()).filter(is_alone).map(|b| base[b]).collect(),
         combined: order.iter().copied().filter(is_combined).collect(),
         rank_gap: rank.gap,
-        ambiguity: ambiguity(&rank, &columns, unit.as_ref(), &ghosts, factor.r()),
+        ambiguity,
         ghosts,
         base_condition,
         pivoted_condition: rank.pivoted_condition,
@@ -154,33 +168,46 @@ fn small_columns(
     columns: &Columns,
     kept: &KeptColumns,
     small: MatRef<'_, f64>,
-    relations: &mut Vec<(usize, Vec<f64>)>,
+    relations: &mut Vec<(usize, Relation)>,
 ) -> Vec<Ghost> {
     let mut ghosts = Vec::new();
     for (position, &column) in columns.small.iter().enumerate() {
         let vector: Vec<f64> = small.col(position).iter().copied().collect();
         let relative_norm = dot(&vector, &vector).sqrt();
-        let (mut relation, residual) = kept.relation(&vector);
-        if residual > VANISHED {
+        let mut relation = kept.relation(&vector);
+        if relation.residual > VANISHED {
             ghosts.push(Ghost {
                 column,
                 relative_norm,
             });
-        } else {
-            for value in &mut relation {
-                *value /= relative_norm;
-            }
-            relations.push((column, relation));
+            continue;
         }
+        for alpha in &mut relation.coefficients {
+            // Rounding of the small column is that of the large ones it was computed from.
+            *alpha = if alpha.abs() < ROUNDING {
+                0.0
+            } else {
+                *alpha / relative_norm
+            };
+        }
+        relations.push((column, relation));
     }
     ghosts
+}
+
+/// How far the coefficients of unit columns are in doubt, per unit of condition number: a tilt that leaves a residual or a
+/// ghost of this size changes the coefficients by as much.
+fn doubt(relations: &[(usize, Relation)], ghosts: &[Ghost]) -> f64 {
+    let residuals = relations.iter().map(|relation| relation.1.residual);
+    let sizes = ghosts.iter().map(|ghost| ghost.relative_norm);
+    DOUBT_MARGIN * residuals.chain(sizes).fold(0.0, f64::max)
 }
 
 /// `K` from the relations of unit columns.
 fn regrouping(
     n: usize,
     base: &[usize],
-    relations: &[(usize, Vec<f64>)],
+    relations: &[(usize, Relation)],
     norms: &[f64],
     zero: f64,
 ) -> Mat<f64> {
@@ -189,7 +216,7 @@ fn regrouping(
         result[(b, column)] = 1.0;
     }
     for (column, relation) in relations {
-        for (b, &alpha) in relation.iter().enumerate() {
+        for (b, &alpha) in relation.coefficients.iter().enumerate() {
             if alpha.abs() > zero {
                 result[(b, *column)] = alpha * (norms[*column] / norms[base[b]]);
             }
@@ -198,27 +225,39 @@ fn regrouping(
     result
 }
 
-/// What is in doubt, with the combination of columns that is most so.
+/// What is in doubt, with the combination of columns that is most so: the largest ghost, or the dependent column with the
+/// largest residual together with the base columns it nearly is.
 fn ambiguity(
     rank: &Rank,
     columns: &Columns,
-    unit: MatRef<'_, f64>,
+    regrouping: &Mat<f64>,
+    base: &[usize],
+    relations: &[(usize, Relation)],
     ghosts: &[Ghost],
-    r: MatRef<'_, f64>,
+    factor: &TriangularFactor,
 ) -> Option<Ambiguity> {
+    let mut combination = vec![0.0; columns.norms.len()];
     let mut upper_rank = rank.upper;
-    if !ghosts.is_empty() {
+    let largest = ghosts
+        .iter()
+        .max_by(|a, b| a.relative_norm.total_cmp(&b.relative_norm));
+    if let Some(ghost) = largest {
+        combination[ghost.column] = 1.0;
         // Two ghosts may be one and the same direction.
         let all = [columns.significant.as_slice(), &columns.small].concat();
-        let values = singular_values(scaled_columns(r, &all, |_| columns.largest).as_ref());
-        let present = values.iter().filter(|value| **value > VANISHED).count();
+        let raw = scaled_columns(factor.r(), &all, |_| columns.largest);
+        let present = singular_values(raw.as_ref())
+            .iter()
+            .filter(|value| **value > VANISHED)
+            .count();
         upper_rank = upper_rank.max(present).max(rank.lower + 1);
-    }
-    let mut combination = vec![0.0; columns.norms.len()];
-    if rank.lower < rank.upper {
-        let direction = right_singular_vector(unit, rank.lower);
-        for (value, &column) in direction.iter().zip(&columns.significant) {
-            combination[column] = value / columns.norms[column];
+    } else if rank.lower < rank.upper {
+        let (column, _) = relations
+            .iter()
+            .max_by(|a, b| a.1.residual.total_cmp(&b.1.residual))?;
+        combination[*column] = 1.0;
+        for (b, &base) in base.iter().enumerate() {
+            combination[base] = -regrouping[(b, *column)];
         }
         let size = combination
             .iter()
@@ -227,10 +266,7 @@ fn ambiguity(
             *value /= size;
         }
     } else {
-        let most = ghosts
-            .iter()
-            .max_by(|a, b| a.relative_norm.total_cmp(&b.relative_norm))?;
-        combination[most.column] = 1.0;
+        return None;
     }
     Some(Ambiguity {
         lower_rank: rank.lower,

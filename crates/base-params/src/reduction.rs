@@ -27,7 +27,8 @@ pub struct Reduction {
     /// `K`, base × columns: base parameters = `K` · standard parameters.
     ///
     /// Its column for a combined column `i` holds the coefficients of `column i = Σ alpha_k · base column k`. Entries at
-    /// rounding level (1e-12 of unit columns, or 64 ε times the condition number if that is more) are exactly zero.
+    /// rounding level (1e-12 of unit columns, or 64 ε times the condition number if that is more) are exactly zero; where the
+    /// relations hold only approximately, so are those below ten times what they leave, times the condition number.
     pub regrouping: Mat<f64>,
     /// The rank is clear by this factor: the smallest ratio of singular values and pivots across it.
     pub rank_gap: f64,
