@@ -14,7 +14,7 @@ pub enum Error {
         /// The rule broken and what to do.
         rule: String,
     },
-    /// The text of a robot file cannot be read.
+    /// The text of a robot file cannot be read, or describes a robot that cannot be.
     #[error("line {line}, column {column}: {message}")]
     Syntax {
         /// Line, from 1.
@@ -36,6 +36,22 @@ impl Error {
             place: place.into(),
             met: met.into(),
             rule: rule.into(),
+        }
+    }
+
+    pub(crate) fn syntax(line: usize, column: usize, message: impl Into<String>) -> Self {
+        Self::Syntax {
+            line,
+            column,
+            message: message.into(),
+        }
+    }
+
+    /// The same finding with its place in the text of the file it came from.
+    pub(crate) fn at(self, line: usize, column: usize) -> Self {
+        match self {
+            Self::Robot { .. } => Self::syntax(line, column, self.to_string()),
+            located => located,
         }
     }
 }

@@ -3,7 +3,10 @@
 use crate::error::Error;
 use crate::parameter::InertialParameters;
 use crate::pose::Pose;
+use crate::suggestion::did_you_mean;
 use nalgebra::Vector3;
+
+mod check;
 
 /// How a joint moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -201,50 +204,54 @@ impl Robot {
         robot
     }
 
-    fn check(&self) -> Result<(), Error> {
-        if self.joints.is_empty() {
-            return Err(Error::robot(
-                &self.name,
-                "no moving joint",
-                "an arm needs at least one revolute or prismatic joint",
+    /// The robot with these joints held at these positions (rad or m): fingers, a torso.
+    ///
+    /// A note says so for each, and says it too where the position lies outside the joint's limits.
+    ///
+    /// # Errors
+    /// A joint that the robot does not have, one given twice, a position that is not finite, no joint left to move.
+    pub fn hold_joints(&self, held: &[(String, f64)]) -> Result<Self, Error> {
+        let mut robot = self.clone();
+        for (k, (name, position)) in held.iter().enumerate() {
+            let place = || format!("held joint {name}");
+            if held[..k].iter().any(|(other, _)| other == name) {
+                return Err(Error::robot(place(), "given twice", "hold it once"));
+            }
+            let Some(joint) = robot.joint_index(name) else {
+                let rule = did_you_mean(name, self.joints.iter().map(|j| j.name.as_str()));
+                return Err(Error::robot(place(), "no such joint that moves", rule));
+            };
+            if !position.is_finite() {
+                return Err(Error::robot(
+                    place(),
+                    format!("position {position}"),
+                    FINITE,
+                ));
+            }
+            if robot.n_joints() == 1 {
+                return Err(Error::robot(
+                    place(),
+                    "no joint left to move",
+                    "hold one less",
+                ));
+            }
+            robot.notes.push(format!(
+                "joint {name} is held at {position}: its link is part of its parent"
             ));
-        }
-        assert_eq!(self.joints.len(), self.links.len(), "one link per joint");
-        if !self.gravity.iter().all(|g| g.is_finite()) {
-            return Err(Error::robot(
-                "gravity",
-                format!("{:?}", self.gravity.as_slice()),
-                "give three finite numbers in m/s², for example (0, 0, -9.81)",
-            ));
-        }
-        for (i, (joint, link)) in self.joints.iter().zip(&self.links).enumerate() {
-            if self.joints[..i].iter().any(|j| j.name == joint.name) {
-                return Err(Error::robot(
-                    format!("joint {}", joint.name),
-                    "name used twice",
-                    "rename one of them",
+            if let Some([low, high]) = robot.joints[joint].limits.position
+                && !(low..=high).contains(position)
+            {
+                robot.notes.push(format!(
+                    "joint {name} is held at {position}, outside its limits {low} to {high}"
                 ));
             }
-            if self.links[..i].iter().any(|l| l.name == link.name) {
-                return Err(Error::robot(
-                    format!("link {}", link.name),
-                    "name used twice",
-                    "rename one of them",
-                ));
-            }
-            if joint.parent.is_some_and(|p| p >= i) {
-                return Err(Error::robot(
-                    format!("joint {}", joint.name),
-                    format!("parent link number {:?}", joint.parent.map(|p| p + 1)),
-                    "a joint stands after the joint that moves its parent link",
-                ));
-            }
-            joint.check()?;
-            link.check()?;
+            robot = robot.lock(joint, *position);
         }
-        Ok(())
+        Ok(robot)
     }
 }
+
+const FINITE: &str = "give a finite number, rad or m";
 
 impl Joint {
     /// `parent_link_from_link` at position `q` (rad or m).
@@ -258,108 +265,5 @@ impl Joint {
             }
         };
         self.parent_from_joint * motion * self.joint_from_link
-    }
-
-    fn check(&self) -> Result<(), Error> {
-        let place = format!("joint {}", self.name);
-        let length = self.axis.norm();
-        if !(length.is_finite() && length > 1e-9) {
-            return Err(Error::robot(
-                place,
-                format!("axis {:?}", self.axis.as_slice()),
-                "an axis needs a direction, for example (0, 0, 1)",
-            ));
-        }
-        let poses = [&self.parent_from_joint, &self.joint_from_link];
-        let finite = poses.iter().all(|p| {
-            p.rotation
-                .iter()
-                .chain(p.translation.iter())
-                .all(|v| v.is_finite())
-        });
-        if !finite || !self.offset.is_finite() {
-            return Err(Error::robot(
-                place,
-                "a pose that is not finite",
-                "give finite lengths and angles",
-            ));
-        }
-        if let Some([low, high]) = self.limits.position
-            && !(low < high)
-        {
-            return Err(Error::robot(
-                place,
-                format!("position limits {low} to {high}"),
-                "the lower limit must be below the upper one",
-            ));
-        }
-        let positive = [
-            ("velocity limit", self.limits.velocity),
-            ("acceleration limit", self.limits.acceleration),
-            ("torque limit", self.limits.torque),
-            ("torque constant", self.actuator.torque_constant),
-            ("encoder counts", self.actuator.encoder_counts),
-        ];
-        for (what, value) in positive {
-            if let Some(v) = value
-                && !(v > 0.0 && v.is_finite())
-            {
-                return Err(Error::robot(
-                    place,
-                    format!("{what} {v}"),
-                    "it must be above zero; leave it out if not known",
-                ));
-            }
-        }
-        let not_negative = [
-            ("rotor inertia", self.actuator.rotor_inertia),
-            ("viscous friction", self.actuator.viscous_friction),
-            ("Coulomb friction", self.actuator.coulomb_friction),
-        ];
-        for (what, value) in not_negative {
-            if let Some(v) = value
-                && !(v >= 0.0 && v.is_finite())
-            {
-                return Err(Error::robot(
-                    place,
-                    format!("{what} {v}"),
-                    "it cannot be below zero",
-                ));
-            }
-        }
-        if let Some(v) = self.actuator.gear_ratio
-            && !(v != 0.0 && v.is_finite())
-        {
-            return Err(Error::robot(
-                place,
-                format!("gear ratio {v}"),
-                "it must be a number other than zero",
-            ));
-        }
-        Ok(())
-    }
-}
-
-impl Link {
-    fn check(&self) -> Result<(), Error> {
-        let Some(p) = &self.inertial else {
-            return Ok(());
-        };
-        let place = format!("link {}", self.name);
-        if !p.0.iter().all(|v| v.is_finite()) {
-            return Err(Error::robot(
-                place,
-                "an inertial value that is not finite",
-                "give finite numbers, or leave the inertial out",
-            ));
-        }
-        if p.mass() < 0.0 {
-            return Err(Error::robot(
-                place,
-                format!("mass {} kg", p.mass()),
-                "a mass cannot be below zero; correct it, or leave the inertial out",
-            ));
-        }
-        Ok(())
     }
 }
