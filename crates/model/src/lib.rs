@@ -42,6 +42,7 @@ mod parameter;
 mod pose;
 mod regressor;
 mod robot;
+mod robot_file;
 mod states;
 mod suggestion;
 #[cfg(test)]
@@ -60,4 +61,5 @@ pub use parameter::{
 pub use pose::{Pose, SNAP_ANGLE, exact_sin_cos, snap_angle};
 pub use regressor::{RegressorBlock, observation_matrix, torque_regressor, visit_torque_regressor};
 pub use robot::{Actuator, Joint, JointKind, JointLimits, Link, Robot};
+pub use robot_file::{robot_from_ron, robot_to_ron};
 pub use states::{JointState, JointStates, random_states};
