@@ -47,6 +47,7 @@ mod states;
 mod suggestion;
 #[cfg(test)]
 mod testing;
+mod urdf;
 
 pub use energy::{energy_difference, energy_regressor, momentum_regressor, power_regressor};
 pub use error::Error;
@@ -63,3 +64,4 @@ pub use regressor::{RegressorBlock, observation_matrix, torque_regressor, visit_
 pub use robot::{Actuator, Joint, JointKind, JointLimits, Link, Robot};
 pub use robot_file::{robot_from_ron, robot_to_ron};
 pub use states::{JointState, JointStates, random_states};
+pub use urdf::{robot_from_urdf, robot_from_urdf_with};
