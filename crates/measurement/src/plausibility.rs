@@ -1,0 +1,260 @@
+//! Does the log mean what it says: clock in seconds, angles in radians, joints on the joint side.
+
+use crate::error::{Error, Place};
+use crate::log::Log;
+use idim_model::{Joint, JointKind, Robot};
+
+/// Checks the clock's unit, recorded velocity against `dq/dt`, and positions against the limits, in this order.
+///
+/// Returns warnings, one sentence each, where going on is safe.
+///
+/// # Errors
+/// As [`check_clock_unit`], [`check_velocity`] and [`check_positions`].
+pub fn check_log(log: &Log, robot: &Robot) -> Result<Vec<String>, Error> {
+    check_clock_unit(log)?;
+    let mut warnings = check_velocity(log, robot)?;
+    warnings.extend(check_positions(log, robot)?);
+    Ok(warnings)
+}
+
+/// Sampling intervals (s) a recorded motion can have: 50 kHz to 2 Hz.
+const PLAUSIBLE_INTERVAL: [f64; 2] = [2e-5, 0.5];
+
+/// Refuses a clock whose unit is not declared and whose interval cannot be seconds.
+///
+/// # Errors
+/// A median interval outside 20 µs to 0.5 s, with the unit that would fit.
+pub fn check_clock_unit(log: &Log) -> Result<(), Error> {
+    let dt = median_interval(&log.time);
+    let [low, high] = PLAUSIBLE_INTERVAL;
+    if log.time_unit_declared || (low..=high).contains(&dt) {
+        return Ok(());
+    }
+    let units = [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
+    let fits = units
+        .iter()
+        .find(|(_, s)| (low..=high).contains(&(dt * s)))
+        .map(|(unit, s)| {
+            format!(
+                "did you mean {unit} (dt = {} s)? then name the column `t_{unit}`",
+                dt * s
+            )
+        });
+    let mut rule = fits.unwrap_or_else(|| "name the column with its unit, `t_s`".into());
+    if dt == 1.0 {
+        rule += "; if it is a sample count, leave it out and give the sample rate";
+    }
+    Err(Error::log(
+        "time-unit",
+        Place::file(&log.file),
+        format!("dt = {dt} s from a clock without a unit"),
+        rule,
+    ))
+}
+
+/// Median of the intervals between samples, s.
+pub(crate) fn median_interval(time: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() {
+        return f64::NAN;
+    }
+    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// How a recorded velocity fits the motion of its joint.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VelocityFit {
+    /// Change of position per integral of the recorded velocity: 1 where they agree.
+    pub factor: f64,
+    /// Correlation of the two.
+    pub correlation: f64,
+}
+
+/// Span over which positions and integrated velocities are compared, s: long against noise and delay.
+const COMPARED_SPAN: f64 = 0.1;
+/// Root mean square displacement (rad, m) over a span below which a joint says nothing.
+const STILL: f64 = 1e-4;
+
+/// Compares changes of position with the integral of the recorded velocity over spans of 0.1 s.
+///
+/// `None` for a joint that hardly moves. Integrals stand noise that derivatives do not.
+pub fn velocity_fit(time: &[f64], q: &[f64], qd: &[f64]) -> Option<VelocityFit> {
+    let dt = median_interval(time);
+    let span = ((COMPARED_SPAN / dt).round() as usize).clamp(2, (q.len() / 4).max(2));
+    let mut integral = vec![0.0; q.len()];
+    for k in 1..q.len() {
+        integral[k] = integral[k - 1] + 0.5 * (qd[k] + qd[k - 1]) * (time[k] - time[k - 1]);
+    }
+    let (mut xx, mut xy, mut yy, mut n) = (0.0, 0.0, 0.0, 0.0);
+    for k in span..q.len() {
+        let x = integral[k] - integral[k - span];
+        let y = q[k] - q[k - span];
+        xx += x * x;
+        xy += x * y;
+        yy += y * y;
+        n += 1.0;
+    }
+    if xx == 0.0 || yy == 0.0 || (yy / n).sqrt() < STILL {
+        return None;
+    }
+    let correlation = xy / (xx * yy).sqrt();
+    // The geometric mean slope treats noise in both alike.
+    Some(VelocityFit {
+        factor: (yy / xx).sqrt().copysign(correlation),
+        correlation,
+    })
+}
+
+/// Correlation above which a factor is meant: two records of one motion.
+const SAME_MOTION: f64 = 0.9;
+/// Deviation of a factor from a suspected one, relative.
+const FACTOR_TOLERANCE: f64 = 0.05;
+
+/// Recorded velocity against `dq/dt`: degrees for radians, wrong sign, gear side.
+///
+/// # Errors
+/// A joint whose positions change by another factor than its velocities say, with the factor and what it means.
+pub fn check_velocity(log: &Log, robot: &Robot) -> Result<Vec<String>, Error> {
+    let mut warnings = Vec::new();
+    let Some(qd) = &log.qd else {
+        return Ok(warnings);
+    };
+    for (j, joint) in robot.joints().iter().enumerate() {
+        let Some(fit) = velocity_fit(&log.time, &log.q[j], &qd[j]) else {
+            continue;
+        };
+        if fit.correlation.abs() < SAME_MOTION {
+            warnings.push(format!(
+                "{}, joint {}: recorded qd follows dq/dt with correlation {:.2} only; differentiate q instead",
+                log.file, joint.name, fit.correlation
+            ));
+        } else if (fit.factor - 1.0).abs() > 2.0 * FACTOR_TOLERANCE {
+            let (code, meaning) = meaning_of_factor(fit.factor, joint);
+            return Err(Error::log(
+                code,
+                Place::file(&log.file).joint(&joint.name),
+                format!(
+                    "q changes {:.4} times as fast as the recorded qd says",
+                    fit.factor
+                ),
+                meaning,
+            ));
+        } else if (fit.factor - 1.0).abs() > FACTOR_TOLERANCE {
+            warnings.push(format!(
+                "{}, joint {}: q changes {:.3} times as fast as the recorded qd says; differentiate q instead",
+                log.file, joint.name, fit.factor
+            ));
+        }
+    }
+    Ok(warnings)
+}
+
+/// Code and explanation of a factor between `dq/dt` and the recorded velocity.
+pub(crate) fn meaning_of_factor(factor: f64, joint: &Joint) -> (&'static str, String) {
+    let near = |x: f64| (factor.abs() / x - 1.0).abs() < FACTOR_TOLERANCE;
+    let degree = 180.0 / std::f64::consts::PI;
+    let flipped = if factor < 0.0 {
+        ", and one of them has the wrong sign"
+    } else {
+        ""
+    };
+    let revolute = joint.kind == JointKind::Revolute;
+    let gear = joint.actuator.gear_ratio.map_or(f64::NAN, f64::abs);
+    if revolute && near(degree) {
+        let text = "that is 180/π: q is in degrees; name it `q1_deg`";
+        return ("degrees", format!("{text}{flipped}"));
+    }
+    if revolute && near(1.0 / degree) {
+        let text = "that is π/180: qd is in degrees a second; name it `qd1_deg_s`";
+        return ("degrees", format!("{text}{flipped}"));
+    }
+    if near(1.0) {
+        return (
+            "velocity-sign",
+            "q and qd have opposite signs; correct the sign of one of them".into(),
+        );
+    }
+    if revolute && near(std::f64::consts::PI / 30.0) {
+        let text = "that is π/30: qd is in turns a minute; name it `qd1_rpm`";
+        return ("velocity-unit", format!("{text}{flipped}"));
+    }
+    if near(gear) {
+        let text = format!(
+            "that is the gear ratio {gear}: q is on the motor side; divide it by the ratio"
+        );
+        return ("gear-side", text + flipped);
+    }
+    if near(1.0 / gear) {
+        let text = format!(
+            "that is 1 / gear ratio {gear}: qd is on the motor side; divide it by the ratio"
+        );
+        return ("gear-side", text + flipped);
+    }
+    if near(1e3) || near(1e-3) {
+        let text = "a factor of 1000: a unit of time or length (ms, mm) is not declared";
+        return ("velocity-unit", format!("{text}{flipped}"));
+    }
+    (
+        "velocity-factor",
+        format!(
+            "they should agree; is one of them on the motor side of a gear or in another unit?{flipped}"
+        ),
+    )
+}
+
+/// Positions this many times as far as a limit, or a range this many times as wide, cannot be the joint's.
+const BEYOND_LIMITS: f64 = 4.0;
+/// Positions this many times as far as a limit are doubtful.
+const DOUBTFUL: f64 = 2.0;
+/// Range of a revolute joint without limits, in turns, that is doubtful.
+const DOUBTFUL_TURNS: f64 = 1.2;
+
+/// Positions against the robot's limits, or against a turn where it states none.
+///
+/// # Errors
+/// A joint with limits that reaches four times as far: degrees, or the motor side of a gear.
+pub fn check_positions(log: &Log, robot: &Robot) -> Result<Vec<String>, Error> {
+    let mut warnings = Vec::new();
+    for (j, joint) in robot.joints().iter().enumerate() {
+        let (low, high) = range(&log.q[j]);
+        let Some(limits) = joint.limits.position else {
+            let turn = 2.0 * std::f64::consts::PI;
+            if joint.kind == JointKind::Revolute && high - low > DOUBTFUL_TURNS * turn {
+                warnings.push(format!(
+                    "{}, joint {}: q ranges over {:.3} rad, more than {DOUBTFUL_TURNS} turns; if it is in degrees, name it `q1_deg`",
+                    log.file, joint.name, high - low
+                ));
+            }
+            continue;
+        };
+        let reach = low.abs().max(high.abs());
+        let largest = limits[0].abs().max(limits[1].abs());
+        let times = (reach / largest).min((high - low).max(reach) / (limits[1] - limits[0]));
+        let unit = if joint.kind == JointKind::Revolute {
+            "degrees (then name it `q1_deg`)"
+        } else {
+            "mm (then name it `q1_mm`)"
+        };
+        let met = format!("q from {low:.4} to {high:.4}");
+        let rule = format!(
+            "the robot's limits are {} to {}; is it in {unit} or on the motor side of a gear?",
+            limits[0], limits[1]
+        );
+        if times > BEYOND_LIMITS {
+            let place = Place::file(&log.file).joint(&joint.name);
+            return Err(Error::log("position-range", place, met, rule));
+        }
+        if times > DOUBTFUL {
+            warnings.push(format!("{}, joint {}: {met}; {rule}", log.file, joint.name));
+        }
+    }
+    Ok(warnings)
+}
+
+pub(crate) fn range(x: &[f64]) -> (f64, f64) {
+    x.iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| {
+            (low.min(v), high.max(v))
+        })
+}
