@@ -139,6 +139,9 @@ fn limit_use(extremum: &Extremum, centre: f64, half: f64) -> LimitUse {
 
 impl FourierSeries {
     /// Extrema of every joint over a period, by branch and bound: exact up to rounding, none missed.
+    ///
+    /// The derivative of an extremum with respect to the coefficients is the basis at its time
+    /// ([`FourierBasis::at`](crate::FourierBasis::at)): the time itself does not count to first order.
     pub fn extrema(&self) -> Vec<JointExtrema> {
         let joint = |j| {
             let [q, qd, qdd] = self.polynomials(j);

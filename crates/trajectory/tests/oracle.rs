@@ -1,7 +1,8 @@
-//! The motion of Radkhah, Kulić & Croft 2007, table I.
+//! The motions of Radkhah, Kulić & Croft 2007, table I, and of Gautier & Khalil 1991, section 6.
 #![allow(clippy::unwrap_used)]
 
-use idim_trajectory::{FourierSeries, Limits, Motion, TrajectoryFile};
+use idim_trajectory::{FourierSeries, Limits, Motion, PathPoint, QuinticPath, TrajectoryFile};
+use rand::{RngExt, SeedableRng};
 
 const TABLE1: &str = include_str!("../../../fixtures/papers/rkc_table1.ron");
 
@@ -98,6 +99,79 @@ fn oracle_table_one_extrema_match_a_sampled_reference() {
                 missed <= curvature * h * h / 8.0,
                 "{key} of joint {}: {ours}, {sampled}",
                 j + 1
+            );
+        }
+    }
+}
+
+/// Durations and first-joint overshoots of `(points, path limits)` found independently, for one random sequence of q1 that
+/// was not recorded: here they must lie among those of many sequences. That q1 is uniform in ±60° is inferred: wider
+/// ranges give durations beyond those found.
+#[test]
+fn oracle_paths_through_optimal_points_last_as_long_as_found_independently() {
+    const DRAWS: usize = 100;
+    let Some(dir) = idim_fixtures::shared_dir() else {
+        eprintln!("skipped: no folder of reference numbers");
+        return;
+    };
+    let read = |name: &str| -> serde_json::Value {
+        let text = std::fs::read_to_string(dir.join("papers/oracles").join(name)).unwrap();
+        serde_json::from_str(&text).unwrap()
+    };
+    let (noise, interp) = (read("g91_noise.json"), read("g91_interp.json"));
+    let range = 60f64.to_radians();
+    let position = [60.0_f64, 60.0, 70.0].map(|q| [-q.to_radians(), q.to_radians()]);
+    for (set, name) in [("opt_S", "opt_S"), ("opt_cond_only", "opt_cond")] {
+        // q2, q3, qd1, qd2, qd3 of each point.
+        let rows: Vec<[f64; 5]> = serde_json::from_value(noise[set]["points"].clone()).unwrap();
+        for (key, velocity, acceleration) in [
+            ("vNone_a2.0", [0.69, 0.61, 0.64], 2.0),
+            ("v1.0_a1.0", [1.0; 3], 1.0),
+            ("v1.28_a2.0", [1.28; 3], 2.0),
+            ("v1.28_a5.0", [1.28; 3], 5.0),
+            ("v2.0_a5.0", [2.0; 3], 5.0),
+        ] {
+            let limits =
+                Limits::new(position.to_vec(), velocity.to_vec(), vec![acceleration; 3]).unwrap();
+            let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+            let mut path = || {
+                let mut points = vec![PathPoint::at_rest(&[0.0; 3])];
+                points.extend(rows.iter().map(|&[q2, q3, qd1, qd2, qd3]| PathPoint {
+                    q: vec![rng.random_range(-range..range), q2, q3],
+                    qd: vec![qd1, qd2, qd3],
+                }));
+                points.push(PathPoint::at_rest(&[0.0; 3]));
+                QuinticPath::shortest(&points, &limits).unwrap()
+            };
+            let paths: Vec<_> = (0..DRAWS).map(|_| path()).collect();
+            let within = |mut ours: Vec<f64>, found: f64, what: &str| {
+                ours.sort_by(f64::total_cmp);
+                let place = format!(
+                    "{what} {name} {key}: {found}, ours {} to {}",
+                    ours[0],
+                    ours[DRAWS - 1]
+                );
+                assert!(ours[0] <= found && found <= ours[DRAWS - 1], "{place}");
+                ours[DRAWS / 2]
+            };
+            let found = &interp[format!("{name}_{key}")];
+            let total = found["total"].as_f64().unwrap();
+            let median = within(
+                paths.iter().map(QuinticPath::duration).collect(),
+                total,
+                "duration",
+            );
+            assert!(
+                (median / total - 1.0).abs() < 0.15,
+                "{name} {key}: {median}, {total}"
+            );
+            let overshoot = paths
+                .iter()
+                .map(|p| p.largest_overshoot(&limits)[0].to_degrees());
+            within(
+                overshoot.collect(),
+                found["over"][0].as_f64().unwrap(),
+                "overshoot",
             );
         }
     }
