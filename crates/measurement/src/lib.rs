@@ -1,24 +1,67 @@
 //! Recorded logs in, conditioned samples out.
 //!
-//! A [`Log`] is what the file says, in SI units; [`Measurements`] are joint positions and torques.
+//! A [`Log`] is what the file says, in SI units; [`Measurements`] are joint positions and torques; [`condition`] turns
+//! them into smooth states with velocity and acceleration, and a [`Decimator`] maps the regressor's columns and the
+//! torque alike, so that `τ = W β` stays true.
+//!
+//! ```
+//! use idim_measurement::{ColumnMapping, ConditioningOptions, JointLabel, LowPass, Measurements};
+//! use idim_measurement::{Drive, condition, read_csv};
+//!
+//! let joints = [JointLabel { name: "shoulder".into(), number: 1, kind: idim_model::JointKind::Revolute, held: false }];
+//! let mut csv = String::from("t_ms,q_shoulder_deg,tau1_Nm\n");
+//! for k in 0..200 {
+//!     let t = 0.01 * f64::from(k);
+//!     csv += &format!("{},{},{}\n", 10 * k, 30.0 * t.sin(), t.cos());
+//! }
+//! let log = read_csv(csv.as_bytes(), "run.csv", &joints, &ColumnMapping::default())?;
+//! let Drive::Torque(torque) = log.drive else { unreachable!() };
+//! let measured = Measurements {
+//!     file: log.file, joints: log.joints, time: log.time, q: log.q, qd: log.qd, qdd: log.qdd, torque,
+//! };
+//! let options = ConditioningOptions {
+//!     low_pass: Some(LowPass { order: 4, cutoff: 10.0 }),
+//!     ..ConditioningOptions::default()
+//! };
+//! let segment = &condition(&measured, &options)?.segments[0];
+//! let (t, qd) = (segment.time[50], segment.states.qd(0)[50]);
+//! assert!((qd - 30f64.to_radians() * t.cos()).abs() < 1e-4);
+//! # Ok::<(), idim_measurement::Error>(())
+//! ```
+//!
+//! It does not decide how a log is filtered: the caller does, and every choice is recorded ([`Choice`]).
 
 mod clock;
+mod conditioning;
+mod decimate;
 mod dialect;
+mod differentiate;
 mod error;
+mod filter;
+mod harmonics;
 mod header;
 mod layout;
 mod log;
 mod measurements;
 mod motion;
+mod period;
 mod plausibility;
 mod quantity;
 
 pub use clock::{Clock, GAP, Gap, interpolate, read_clock, uniform_grid, uniform_interval};
+pub use conditioning::{
+    Choice, Conditioned, ConditioningOptions, Derivatives, LowPass, Segment, condition,
+};
+pub use decimate::Decimator;
+pub use differentiate::{first_difference, second_difference};
 pub use error::{Error, Place};
+pub use filter::{Section, butterworth, chebyshev, filter_zero_phase, padding, settling};
+pub use harmonics::{Harmonics, fit_harmonics};
 pub use header::{ColumnMapping, JointLabel, MappedColumn, joint_labels};
 pub use log::{Drive, Log, read_csv};
 pub use measurements::Measurements;
 pub use motion::{JointMotion, check_motion, joint_motion};
+pub use period::{Period, PeriodAverage, REPEATS, average_periods, find_period};
 pub use plausibility::{
     VelocityFit, check_clock_unit, check_log, check_positions, check_velocity, velocity_fit,
 };
