@@ -18,7 +18,8 @@ const GUESS_VELOCITIES: usize = 100;
 /// does not appear in a velocity, so it is an argument here (rad, one a joint).
 ///
 /// # Panics
-/// If joints differ in their number of velocities, or have not more than `2 * n_harmonics`.
+/// If joints differ in their number of velocities, or have not more than `2 * n_harmonics`, or the period is not above
+/// zero.
 #[track_caller]
 pub fn fit_velocities(
     velocities: &[Vec<f64>],
@@ -53,6 +54,9 @@ pub fn fit_velocities(
 /// [`fit_velocities`] about the centre of the position range, then made smaller where it leaves the limits.
 ///
 /// `period` s. More velocities are drawn where a hundred would not determine the harmonics.
+///
+/// # Panics
+/// If there is no harmonic, or the period is not above zero.
 pub fn initial_guess(limits: &Limits, n_harmonics: usize, period: f64, seed: u64) -> FourierSeries {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let n = GUESS_VELOCITIES.max(4 * n_harmonics);
@@ -69,6 +73,9 @@ pub fn initial_guess(limits: &Limits, n_harmonics: usize, period: f64, seed: u64
 ///
 /// Velocity coefficients uniform, so that all harmonics move the joint alike fast; the joint's middle position uniform in the room
 /// its swing leaves.
+///
+/// # Panics
+/// If there is no harmonic, or the period is not above zero.
 pub fn random_series(limits: &Limits, n_harmonics: usize, period: f64, seed: u64) -> FourierSeries {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let n_joints = limits.n_joints();
