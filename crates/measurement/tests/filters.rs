@@ -71,7 +71,7 @@ fn identity_gain_is_one_at_rest_and_one_half_at_the_cutoff() {
         assert_close(&rest, &[0.7; 200], ROUNDING);
         // A cosine at the cutoff keeps half its amplitude, away from the edges.
         let x: Vec<f64> = (0..4000)
-            .map(|k| (0.1 * std::f64::consts::PI * k as f64).cos())
+            .map(|k| (0.1 * std::f64::consts::PI * f64::from(k)).cos())
             .collect();
         let y = filter_zero_phase(&sections, &x);
         let edge = 10 * settling(&sections);
@@ -85,7 +85,7 @@ fn identity_a_slow_sine_passes_unchanged_after_trimming() {
     // Ten octaves below the cutoff of order 4 the gain differs from one by (1/16)^8.
     let sections = butterworth(4, 16.0, 1000.0);
     let x: Vec<f64> = (0..6000)
-        .map(|k| (std::f64::consts::TAU * 1e-3 * k as f64).sin())
+        .map(|k| (std::f64::consts::TAU * 1e-3 * f64::from(k)).sin())
         .collect();
     let y = filter_zero_phase(&sections, &x);
     let edge = 3 * settling(&sections);

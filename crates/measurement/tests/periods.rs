@@ -11,10 +11,10 @@ fn series(t: f64, joint: usize) -> [f64; 3] {
     let mut x = [0.3 * j, 0.0, 0.0];
     for l in 1..=4 {
         let (a, b) = (
-            (l as f64 + j).sin() / l as f64,
-            (2.0 * l as f64 - j).cos() / l as f64,
+            (f64::from(l) + j).sin() / f64::from(l),
+            (2.0 * f64::from(l) - j).cos() / f64::from(l),
         );
-        let v = w * l as f64;
+        let v = w * f64::from(l);
         let (s, c) = (v * t).sin_cos();
         x[0] += a * c + b * s;
         x[1] += v * (b * c - a * s);
