@@ -33,6 +33,10 @@ pub enum Criterion {
     ///
     /// Radkhah, Kulić & Croft print `-log det M` of the *covariance* `M`; that is a slip of sign.
     LogDet,
+    /// `tr (WᵀW / n_samples)⁻¹`: a-optimality, the sum of the variances.
+    TraceInverse,
+    /// `√n_samples / σ_b`: e-optimality, the worst standard deviation.
+    WorstDirection,
 }
 
 impl Criterion {
@@ -52,6 +56,26 @@ impl Criterion {
                 equilibrium: weight,
             } => condition * two_norm(&singular_values(w)) + weight * equilibrium(w).ratio,
             Self::LogDet => -log_det(&singular_values(w), n_samples),
+            Self::TraceInverse => trace_inverse(&singular_values(w), n_samples),
+            Self::WorstDirection => worst_direction(&singular_values(w), n_samples),
+        }
+    }
+
+    /// What the optimisers lower: the logarithm, or the value itself where it is one already.
+    ///
+    /// The minimum is the same; quadratics fit it over the many orders of magnitude between start and end.
+    pub(crate) fn logarithm(&self, value: f64) -> f64 {
+        match self {
+            Self::LogDet => value,
+            _ => value.ln(),
+        }
+    }
+
+    /// Inverse of [`Self::logarithm`].
+    pub(crate) fn value_of_logarithm(&self, logarithm: f64) -> f64 {
+        match self {
+            Self::LogDet => logarithm,
+            _ => logarithm.exp(),
         }
     }
 }
@@ -123,14 +147,13 @@ impl Conditioning {
         };
         let sigma = singular_values(r);
         let unit = scaled(r, Scaling::Equilibrated);
-        let n = n_samples as f64;
         Self {
             raw: numbers(r, &sigma),
             equilibrated: numbers(unit.as_ref(), &singular_values(unit.as_ref())),
             equilibrium: None,
             log_det: log_det(&sigma, n_samples),
-            smallest_singular_value: sigma.last().map_or(0.0, |s| s / n.sqrt()),
-            trace_inverse: sigma.iter().map(|s| n / (s * s)).sum(),
+            smallest_singular_value: 1.0 / worst_direction(&sigma, n_samples),
+            trace_inverse: trace_inverse(&sigma, n_samples),
         }
     }
 }
@@ -153,6 +176,16 @@ fn frobenius(sigma: &[f64]) -> f64 {
 fn log_det(sigma: &[f64], n_samples: usize) -> f64 {
     let log_n = (n_samples as f64).ln();
     sigma.iter().map(|s| 2.0 * s.ln() - log_n).sum()
+}
+
+fn trace_inverse(sigma: &[f64], n_samples: usize) -> f64 {
+    let n = n_samples as f64;
+    sigma.iter().map(|s| n / (s * s)).sum()
+}
+
+fn worst_direction(sigma: &[f64], n_samples: usize) -> f64 {
+    let smallest = sigma.last().copied().unwrap_or(f64::INFINITY);
+    (n_samples as f64).sqrt() / smallest
 }
 
 fn pivoted_estimate(w: MatRef<'_, f64>) -> f64 {

@@ -1,21 +1,49 @@
 //! The motion that reveals most.
 //!
-//! A motion gives rows `W` of `y = W X`; how far noise in `y` or `W` reaches the parameters is bounded by the
-//! condition number of `W` (Gautier & Khalil 1991, eqs. 12, 13), its volume by `det WᵀW`. This crate measures that
-//! ([`Conditioning`], [`Criterion`]) and finds motions that make it small:
-//! - [`optimise_points_powell`]: chained points `(q, q̇)` of the energy model, as Gautier & Khalil do.
+//! A motion gives rows `W` of `y = W X`. How far noise reaches the parameters is bounded by the condition number,
+//!
+//! ```text
+//! ‖δX‖ / ‖X‖ ≤ Cond(W) ‖δY‖ / ‖Y‖        Gautier & Khalil 1991, eq. 12
+//! ```
+//!
+//! and the volume of their uncertainty by `det (WᵀW)⁻¹`. This crate measures both ([`Conditioning`], [`Criterion`])
+//! and finds motions that make them small:
+//! - [`optimise_points_powell`]: chained points `(q, q̇)` of the energy model, as Gautier & Khalil do;
+//! - [`optimise_fourier`]: a periodic motion of the torque model inside certified limits, as Radkhah, Kulić & Croft do.
+//!
+//! ```
+//! use idim_excitation::{EnergyDesign, PointLimits, random_condition_statistics};
+//! use idim_model::{Columns, Parameter, ParameterKind::{MX, MY, ZZ}, robot_from_ron};
+//!
+//! // A pendulum of two links: its six base parameters, and what thirty random energy differences tell of them.
+//! let robot = robot_from_ron(idim_fixtures::PLANAR2R)?;
+//! let column = |(kind, index)| Parameter { kind, index };
+//! let base = [(ZZ, 0), (MX, 0), (MY, 0), (ZZ, 1), (MX, 1), (MY, 1)].map(column);
+//! let limits = PointLimits { position: vec![[-1.0, 1.0]; 2], velocity: vec![2.0; 2] };
+//! let design = EnergyDesign::new(&robot, &Columns(base.to_vec()), limits)?;
+//! let chance = random_condition_statistics(&design, 30, 100, 1);
+//! assert!(chance.min < chance.median && chance.median < 1e4);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Not here: which columns are independent (`idim-base-params`), families of motion and their limits
+//! (`idim-trajectory`), estimation.
 
 mod criterion;
 mod dense;
 mod energy;
 mod error;
+mod fourier;
+mod fourier_objective;
 mod points;
 mod points_powell;
 mod powell;
 mod random_condition;
+mod spectrum;
 
 pub use criterion::{ConditionNumbers, Conditioning, Criterion, Equilibrium, Scaling};
 pub use error::Error;
+pub use fourier::{FourierDesign, FourierOptions, optimise_fourier, series_conditioning};
 pub use points::{EnergyDesign, PointLimits};
 pub use points_powell::{PointDesign, PowellPointOptions, optimise_points_powell};
 pub use powell::{PowellOptions, PowellOutcome, powell};

@@ -106,7 +106,7 @@ impl Run {
             Criterion::TwoNorm(Scaling::Raw).evaluate(objective.rows().as_ref(), options.n_rows);
         let outcome = powell(|x| objective.log_value(x), &x, &options.powell);
         Self {
-            value: objective.value_of_log(outcome.value),
+            value: options.criterion.value_of_logarithm(outcome.value),
             x: outcome.x,
             initial_condition,
             n_evaluations: outcome.n_evaluations,
@@ -149,21 +149,12 @@ impl<'a> PointObjective<'a> {
         }
     }
 
-    /// Logarithm of the criterion (itself for log det, which is one already): quadratics fit it better and the
-    /// minimum is the same.
+    /// Logarithm of the criterion as [`Criterion::logarithm`] has it.
     fn log_value(&mut self, x: &[f64]) -> f64 {
         self.update_rows(x);
         match self.criterion {
             Criterion::Frobenius(Scaling::Raw) => self.log_frobenius(),
-            Criterion::LogDet => self.evaluate(),
-            _ => self.evaluate().ln(),
-        }
-    }
-
-    fn value_of_log(&self, value: f64) -> f64 {
-        match self.criterion {
-            Criterion::LogDet => value,
-            _ => value.exp(),
+            criterion => criterion.logarithm(self.evaluate()),
         }
     }
 
