@@ -38,6 +38,7 @@ mod dialect;
 mod differentiate;
 mod error;
 mod filter;
+mod finder;
 mod harmonics;
 mod header;
 mod layout;
