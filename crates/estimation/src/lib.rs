@@ -30,13 +30,19 @@
 
 mod conditioning;
 mod error;
+mod essential;
 mod householder;
 mod information;
 mod noise;
+mod quantile;
 mod rank;
 mod residuals;
+mod reweighted;
+mod robust;
 mod sandwich;
 mod solve;
+mod spans;
+mod total;
 mod triangular;
 mod weighted;
 
@@ -45,12 +51,22 @@ pub use conditioning::{
     observation_error_bound,
 };
 pub use error::{Error, Place};
+pub use essential::{
+    DroppedParameter, EssentialOptions, EssentialParameters, essential_parameters,
+};
 pub use information::{InformationFactor, Parts, factor_of};
 pub use noise::{NoiseCovariance, ResidualCovariance};
+pub use quantile::{chi_square_quantile, f_quantile, student_t_quantile};
 pub use rank::{RANK_TOLERANCE, VANISHING_COLUMN};
 pub use residuals::{JointResidual, ResidualStatistics};
+pub use reweighted::{RobustEstimate, RobustOptions, RobustSolution, robust_least_squares};
+pub use robust::{
+    HUBER_K, MAD_TO_SIGMA, RobustLoss, RobustWeights, TUKEY_C, mad_scale, robust_weights,
+};
 pub use sandwich::sandwich_covariance;
-pub use solve::{Estimate, RankDeficiency, Solution, solve, solve_with_known_noise};
+pub use solve::{Estimate, NoiseSource, RankDeficiency, Solution, solve, solve_with_known_noise};
+pub use spans::{DownWeightedSpan, SpanOptions, down_weighted_spans};
+pub use total::{DriveGainSample, TotalLeastSquares, TotalSolution, total_least_squares};
 pub use weighted::{
     WeightedEstimate, WeightedSolution, Weighting, WeightingOptions, weighted_least_squares,
     weighted_least_squares_dense,

@@ -3,6 +3,7 @@
 use crate::conditioning::{ConditionNumber, NEAR_SINGULAR_CONDITION, condition_of};
 use crate::error::Error;
 use crate::information::{InformationFactor, Parts};
+use crate::quantile::student_t_quantile;
 use crate::rank::{RankFactor, rank_factor};
 use crate::triangular::{column_norms, invert_upper, solve_upper};
 use faer::Mat;
@@ -47,6 +48,8 @@ pub struct Estimate {
     pub covariance: Mat<f64>,
     /// Standard deviation of one row: estimated from the residual by [`solve`], as given in [`solve_with_known_noise`].
     pub sigma: f64,
+    /// Where `sigma` comes from; decides between Student's t and the normal distribution in [`Estimate::confidence_interval`].
+    pub noise: NoiseSource,
     /// Rank of `W`, the number of columns.
     pub rank: usize,
     /// Rows of `W`.
@@ -68,6 +71,22 @@ impl Estimate {
     /// `‖y - W x‖ / ‖y‖`.
     pub fn relative_error(&self) -> f64 {
         self.residual_norm / self.observation_norm
+    }
+
+    /// The interval that holds the true value of one parameter with probability `level`, if the noise is as assumed.
+    ///
+    /// Student's t with the degrees of freedom where sigma was estimated, normal where it was given.
+    ///
+    /// # Panics
+    /// If there is no such column, or `level` is not inside (0, 1).
+    #[track_caller]
+    pub fn confidence_interval(&self, column: usize, level: f64) -> [f64; 2] {
+        let freedom = match self.noise {
+            NoiseSource::Residual => self.degrees_of_freedom as f64,
+            NoiseSource::Given => f64::INFINITY,
+        };
+        let half = student_t_quantile(0.5 + 0.5 * level, freedom) * self.standard_deviation[column];
+        [self.values[column] - half, self.values[column] + half]
     }
 
     /// Standard deviation of one row as the residual shows it; not a number without degrees of freedom.
@@ -106,6 +125,15 @@ pub struct RankDeficiency {
     pub observation_norm: f64,
     /// Rows of `W`.
     pub n_rows: usize,
+}
+
+/// Where the standard deviation of a row comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoiseSource {
+    /// Estimated from the residual.
+    Residual,
+    /// Given by the caller.
+    Given,
 }
 
 /// How noisy a row is.
@@ -180,9 +208,12 @@ fn determined(parts: &Parts, norms: &[f64], m: usize, noise: Noise) -> Result<Es
     let n = parts.z.len();
     let residual_norm = parts.e.abs();
     let degrees_of_freedom = m - n;
-    let sigma = match noise {
-        Noise::Known(sigma) => sigma,
-        Noise::FromResidual => residual_norm / (degrees_of_freedom as f64).sqrt(),
+    let (sigma, source) = match noise {
+        Noise::Known(sigma) => (sigma, NoiseSource::Given),
+        Noise::FromResidual => (
+            residual_norm / (degrees_of_freedom as f64).sqrt(),
+            NoiseSource::Residual,
+        ),
     };
     let values = solve_upper(parts.r.as_ref(), &parts.z);
     let covariance = unit_covariance(parts, norms) * faer::Scale(sigma * sigma);
@@ -203,6 +234,7 @@ fn determined(parts: &Parts, norms: &[f64], m: usize, noise: Noise) -> Result<Es
         relative_std,
         covariance,
         sigma,
+        noise: source,
         rank: n,
         n_rows: m,
         degrees_of_freedom,

@@ -382,3 +382,22 @@ fn identity_residual_statistics_agree_with_the_fit() {
         .sum();
     assert!((squares.sqrt() / fit.residual_norm - 1.0).abs() < 1e-12);
 }
+
+#[test]
+fn identity_student_intervals_cover_with_few_rows() {
+    // Five rows, two unknowns: the normal interval would cover 86 %. 3000 ± 11.9 at 0.95, four of them.
+    let (runs, mut hits) = (3000, 0_u32);
+    let mut rng = rng(11);
+    let w = normals(&mut rng, 10);
+    for _ in 0..runs {
+        let y: Vec<f64> = times(&w, &[1.0, -2.0])
+            .iter()
+            .zip(normals(&mut rng, 5))
+            .map(|(y, e)| y + e)
+            .collect();
+        let fit = solve(&factor(&w, &y, 2)).unwrap().determined().unwrap();
+        let [low, high] = fit.confidence_interval(1, 0.95);
+        hits += u32::from((low..=high).contains(&-2.0));
+    }
+    assert!((2803..=2897).contains(&hits), "{hits} of {runs}");
+}
