@@ -19,7 +19,7 @@ pub(crate) struct Finder<'a> {
 
 impl<'a> Finder<'a> {
     pub(crate) fn new(
-        pub(crate) headers: &'a [String],
+        headers: &'a [String],
         joints: &'a [JointLabel],
         mapping: &ColumnMapping,
         file: &'a str,
