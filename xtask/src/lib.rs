@@ -1,0 +1,3 @@
+//! What the driver can do, as functions: each command and each test calls them.
+
+pub mod tidy;
