@@ -75,6 +75,25 @@ pub enum Error {
         /// The rule it breaks.
         rule: &'static str,
     },
+    /// The prior of a link is no body.
+    #[error(
+        "the prior of link {link} (counted from 0 in the list of links) cannot be a rigid body: its pseudo-inertia has eigenvalue {eigenvalue}; \
+         check mass, centre and triangle inequality, or take the prior from the link's geometry"
+    )]
+    UnphysicalPrior {
+        /// Link counted from 0 in the list given.
+        link: usize,
+        /// Smallest eigenvalue of its pseudo-inertia.
+        eigenvalue: f64,
+    },
+    /// A free standard parameter that no row determines.
+    #[error(
+        "standard parameter {column} (counted from 0) is free, and no row determines it; give it a prior or leave it out"
+    )]
+    UndeterminedStandard {
+        /// Its column.
+        column: usize,
+    },
     /// An iterative decomposition did not converge (a singular value decomposition of finite numbers always should).
     #[error(
         "the singular value decomposition of a {n} x {n} triangle did not converge; check the data for extreme values"

@@ -29,6 +29,7 @@
 //! matrix in silence.
 
 mod conditioning;
+mod consistency;
 mod error;
 mod essential;
 mod householder;
@@ -49,6 +50,10 @@ mod weighted;
 pub use conditioning::{
     ConditionNumber, NEAR_SINGULAR_CONDITION, condition_number, matrix_error_bound,
     observation_error_bound,
+};
+pub use consistency::{
+    ConsistencyOptions, LinkPrior, PhysicalEstimate, PhysicalParameters, PhysicalProblem,
+    PositivePrior, Price, Verdict, physically_consistent,
 };
 pub use error::{Error, Place};
 pub use essential::{
