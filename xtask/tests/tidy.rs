@@ -127,7 +127,7 @@ fn regress_an_arrow_that_runs_back_up_is_found() {
             ("fixtures/Cargo.toml", &fixtures),
             ("crates/cloud/Cargo.toml", &stranger),
             (
-                "crates/estimation/src/physical_consistency.rs",
+                "crates/estimation/src/consistency/mod.rs",
                 "use idim_model::InertialParameters;\n",
             ),
             (

@@ -20,7 +20,7 @@ const ARROWS: [(&str, &[&str]); 10] = [
 ];
 
 /// The one place of `estimation` that may know the model: the type of a link's ten parameters.
-const PHYSICAL: &str = "crates/estimation/src/physical";
+const PHYSICAL: &str = "crates/estimation/src/consistency";
 
 /// Crates depend on each other as the architecture says.
 pub fn arrows(tree: &Tree) -> Vec<String> {
