@@ -1,26 +1,29 @@
-//! A smooth criterion of the torque regressor along a Fourier motion, and its gradient by the coefficients.
+//! A smooth criterion of the torque regressor along a Fourier motion, and its exact gradient by the coefficients.
+//!
+//! With `A = Σ YᵀY` and `S = ∂f/∂A`: `df = 2 Σ_t ⟨Y_t S, dY_t⟩`, which the model's reverse mode takes to the states and
+//! the transpose of the basis to the coefficients.
 
 use crate::Conditioning;
 use crate::FourierOptions;
-use crate::spectrum::SmoothCriterion;
-use faer::Mat;
-use idim_model::{Columns, JointStates, Model, RegressorBlock, visit_torque_regressor};
+use crate::spectrum::{SmoothCriterion, SpectralPoint};
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::{Accum, Mat, Par};
+use idim_model::{
+    Columns, JointStates, Model, regressor_contraction_gradient, visit_torque_regressor,
+};
 use idim_trajectory::FourierBasis;
-
-/// Step of the central differences by position and velocity (rad, rad/s): their error is about 1e-10 relative.
-const STEP: f64 = 1e-5;
 
 /// The function an optimiser lowers: coefficients (joint after joint) to the logarithm of the criterion.
 pub(crate) struct FourierObjective<'a> {
     model: &'a Model,
     columns: &'a Columns,
-    criterion: SmoothCriterion,
+    pub(crate) criterion: SmoothCriterion,
     basis: FourierBasis,
     states: JointStates,
     /// Stacked rows, joint after joint: row `joint · n_samples + sample`, so that lanes lie side by side.
     w: Mat<f64>,
-    /// Derivative of the criterion by the entries of `w`.
-    by_rows: Mat<f64>,
+    information: Mat<f64>,
+    point: Option<SpectralPoint>,
     n_evaluations: usize,
 }
 
@@ -39,7 +42,8 @@ impl<'a> FourierObjective<'a> {
             basis: FourierBasis::equispaced(options.period, options.n_harmonics, options.n_samples),
             states: JointStates::zeros(model.n_joints(), options.n_samples),
             w: Mat::zeros(n_rows, columns.len()),
-            by_rows: Mat::zeros(n_rows, columns.len()),
+            information: Mat::zeros(columns.len(), columns.len()),
+            point: None,
             n_evaluations: 0,
         }
     }
@@ -53,20 +57,45 @@ impl<'a> FourierObjective<'a> {
         Conditioning::of_rows(self.w.as_ref(), self.basis.n_samples())
     }
 
+    /// Logarithm of the criterion; infinite where columns are dependent.
     pub(crate) fn value(&mut self, coefficients: &[f64]) -> f64 {
         self.update(coefficients);
-        let n = self.basis.n_samples();
-        finite(self.criterion.evaluate(self.w.as_ref(), n, None))
+        let (a, w) = (self.information.as_mut(), self.w.as_ref());
+        let (full, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
+        let wt = w.transpose();
+        matmul(a, lower, Accum::Replace, wt, full, w, full, 1.0, Par::Seq);
+        let point = self
+            .criterion
+            .at(self.information.as_ref(), self.basis.n_samples());
+        let value = point.value;
+        self.point = Some(point);
+        value
     }
 
-    pub(crate) fn value_and_gradient(&mut self, coefficients: &[f64], out: &mut [f64]) -> f64 {
-        self.update(coefficients);
-        let n = self.basis.n_samples();
-        let by_rows = Some(self.by_rows.as_mut());
-        let value = self.criterion.evaluate(self.w.as_ref(), n, by_rows);
-        let by_states = self.by_states();
-        out.copy_from_slice(&self.basis.pull_back(&by_states));
-        finite(value)
+    /// Gradient where the value was asked for last.
+    ///
+    /// # Panics
+    /// If no value was asked for.
+    pub(crate) fn gradient(&self) -> Vec<f64> {
+        let point = self.point.as_ref().expect("a value comes first");
+        let s = self.criterion.by_information(point);
+        let n = self.w.ncols();
+        let by_states =
+            regressor_contraction_gradient(self.model, self.columns, &self.states, |y, g| {
+                for joint in 0..y.n_joints() {
+                    for b in 0..n {
+                        let mut sum = [0.0; 8];
+                        for a in 0..n {
+                            let (lanes, s) = (y.lanes(joint, a), 2.0 * s[(a, b)]);
+                            for k in 0..8 {
+                                sum[k] += lanes[k] * s;
+                            }
+                        }
+                        *g.lanes_mut(joint, b) = sum;
+                    }
+                }
+            });
+        self.basis.pull_back(&by_states)
     }
 
     fn update(&mut self, coefficients: &[f64]) {
@@ -85,78 +114,5 @@ impl<'a> FourierObjective<'a> {
                 }
             }
         });
-    }
-
-    /// Derivative of `⟨G_t, Y(q, q̇, q̈)⟩` at every sample by its state: central differences of the regressor.
-    ///
-    /// Along the acceleration the regressor is linear, so the difference is exact.
-    fn by_states(&self) -> JointStates {
-        let n = self.states.n_samples();
-        let mut out = JointStates::zeros(self.states.n_joints(), n);
-        let mut moved = self.states.clone();
-        for joint in 0..self.states.n_joints() {
-            for kind in 0..3 {
-                let step = if kind == 2 { 1.0 } else { STEP };
-                let base = pick(&self.states, kind, joint).to_vec();
-                let mut slopes = vec![0.0; n];
-                for sign in [1.0, -1.0] {
-                    let row = pick_mut(&mut moved, kind, joint);
-                    for (x, b) in row.iter_mut().zip(&base) {
-                        *x = b + sign * step;
-                    }
-                    self.contract(&moved, sign / (2.0 * step), &mut slopes);
-                }
-                pick_mut(&mut moved, kind, joint).copy_from_slice(&base);
-                pick_mut(&mut out, kind, joint).copy_from_slice(&slopes);
-            }
-        }
-        out
-    }
-
-    /// Adds `factor ⟨G_t, Y_t⟩` of every sample.
-    fn contract(&self, states: &JointStates, factor: f64, out: &mut [f64]) {
-        let n = states.n_samples();
-        visit_torque_regressor(self.model, self.columns, states, |block| {
-            let (first, count) = (block.first_sample(), block.n_samples());
-            let mut sum = [0.0; RegressorBlock::LANES];
-            for column in 0..block.n_columns() {
-                let g = self.by_rows.col(column);
-                for joint in 0..block.n_joints() {
-                    let lanes = block.lanes(joint, column);
-                    for k in 0..count {
-                        sum[k] += lanes[k] * g[joint * n + first + k];
-                    }
-                }
-            }
-            for k in 0..count {
-                out[first + k] += factor * sum[k];
-            }
-        });
-    }
-}
-
-fn pick(states: &JointStates, kind: usize, joint: usize) -> &[f64] {
-    match kind {
-        0 => states.q(joint),
-        1 => states.qd(joint),
-        _ => states.qdd(joint),
-    }
-}
-
-fn pick_mut(states: &mut JointStates, kind: usize, joint: usize) -> &mut [f64] {
-    match kind {
-        0 => states.q_mut(joint),
-        1 => states.qd_mut(joint),
-        _ => states.qdd_mut(joint),
-    }
-}
-
-/// A large number in place of infinity, which the line search of the optimiser cannot step back from.
-fn finite(value: f64) -> f64 {
-    const WORSE_THAN_ANY: f64 = 1e6;
-    if value.is_finite() {
-        value
-    } else {
-        WORSE_THAN_ANY
     }
 }

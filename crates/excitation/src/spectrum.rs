@@ -3,8 +3,10 @@
 //! With `A = WᵀW = V diag(λ) Vᵀ` and a criterion `f(λ)`: `df = ⟨G, dW⟩`, `G = 2 W V diag(∂f/∂λ) Vᵀ`.
 
 use crate::criterion::{Criterion, Scaling};
+#[cfg(test)]
+use faer::MatMut;
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Mat, MatMut, MatRef, Par, Side};
+use faer::{Accum, Mat, MatRef, Par, Side};
 
 /// Eigenvalues closer to zero than this share of the largest are rounding of `WᵀW`: the criterion is infinite there.
 const RANK_TOLERANCE: f64 = 1e-15;
@@ -29,6 +31,20 @@ enum Spectral {
     LogTraceInverse,
     /// `-½ log λ_b`.
     LogWorst,
+    /// `(1/p) ½ log Σ λ⁻ᵖ`, from above towards the one before as p grows.
+    WorstNorm { power: f64 },
+}
+
+/// A criterion at one information matrix.
+pub(crate) struct SpectralPoint {
+    pub(crate) value: f64,
+    /// Eigenvalues of the scaled information, smallest first, and the derivative by each.
+    pub(crate) lambda: Vec<f64>,
+    pub(crate) slope: Vec<f64>,
+    /// Their eigenvectors.
+    pub(crate) vectors: Mat<f64>,
+    scaled: Mat<f64>,
+    scale: Vec<f64>,
 }
 
 impl SmoothCriterion {
@@ -56,6 +72,7 @@ impl SmoothCriterion {
 
     /// Value for `w`; infinite when its columns are dependent to rounding. With `gradient`, the derivative by
     /// every entry of `w` as well (zero where infinite).
+    #[cfg(test)]
     pub(crate) fn evaluate(
         &self,
         w: MatRef<'_, f64>,
@@ -64,44 +81,70 @@ impl SmoothCriterion {
     ) -> f64 {
         let n = w.ncols();
         let mut information = Mat::zeros(n, n);
-        matmul(
-            information.as_mut(),
-            Accum::Replace,
-            w.transpose(),
-            w,
-            1.0,
-            Par::Seq,
-        );
-        let scale = self.column_scale(information.as_ref());
-        let scaled = Mat::from_fn(n, n, |i, j| information[(i, j)] * scale[i] * scale[j]);
-        let Ok(eigen) = scaled.self_adjoint_eigen(Side::Lower) else {
-            return f64::INFINITY;
-        };
-        let lambda: Vec<f64> = (0..n).map(|k| eigen.S().column_vector()[k]).collect();
-        let largest = lambda.last().copied().unwrap_or(1.0);
-        if !largest.is_finite() || lambda[0] <= RANK_TOLERANCE * largest {
-            if let Some(mut g) = gradient {
-                g.fill(0.0);
-            }
-            return f64::INFINITY;
-        }
-        let (value, slope) = self.function.value_and_slope(&lambda, n_samples);
+        let a = information.as_mut();
+        matmul(a, Accum::Replace, w.transpose(), w, 1.0, Par::Seq);
+        let point = self.at(information.as_ref(), n_samples);
         if let Some(g) = gradient {
-            let v = eigen.U();
-            let middle = Mat::from_fn(n, n, |i, k| v[(i, k)] * slope[k]);
-            let mut by_information = Mat::zeros(n, n);
-            matmul(
-                by_information.as_mut(),
-                Accum::Replace,
-                middle.as_ref(),
-                v.transpose(),
-                1.0,
-                Par::Seq,
-            );
-            self.back_through_scale(&mut by_information, &scaled, &scale);
+            let by_information = self.by_information(&point);
             matmul(g, Accum::Replace, w, by_information.as_ref(), 2.0, Par::Seq);
         }
-        value
+        point.value
+    }
+
+    /// The same, smoother: extreme eigenvalues of a condition number or of the worst direction give way to norms of
+    /// this power, which tend to them from above.
+    pub(crate) fn smoothed(self, power: f64) -> Self {
+        let function = match self.function {
+            Spectral::LogCondition => Spectral::Schatten { power, factor: 1.0 },
+            Spectral::LogWorst => Spectral::WorstNorm { power },
+            other => other,
+        };
+        Self { function, ..self }
+    }
+
+    /// Value at an information matrix `A = WᵀW` (its lower triangle) and what the gradient needs; infinite when `A`
+    /// is singular to rounding.
+    pub(crate) fn at(&self, information: MatRef<'_, f64>, n_samples: usize) -> SpectralPoint {
+        let n = information.ncols();
+        let scale = self.column_scale(information);
+        let scaled = Mat::from_fn(n, n, |i, j| {
+            let (i, j) = (i.max(j), i.min(j));
+            information[(i, j)] * scale[i] * scale[j]
+        });
+        let mut point = SpectralPoint {
+            value: f64::INFINITY,
+            lambda: vec![0.0; n],
+            slope: vec![0.0; n],
+            vectors: Mat::zeros(n, n),
+            scaled,
+            scale,
+        };
+        let Ok(eigen) = point.scaled.self_adjoint_eigen(Side::Lower) else {
+            return point;
+        };
+        for k in 0..n {
+            point.lambda[k] = eigen.S().column_vector()[k];
+        }
+        let largest = point.lambda.last().copied().unwrap_or(1.0);
+        if !largest.is_finite() || point.lambda[0] <= RANK_TOLERANCE * largest {
+            return point;
+        }
+        point.vectors.copy_from(eigen.U());
+        (point.value, point.slope) = self.function.value_and_slope(&point.lambda, n_samples);
+        point
+    }
+
+    /// Derivative of the value by the information matrix, symmetric.
+    pub(crate) fn by_information(&self, point: &SpectralPoint) -> Mat<f64> {
+        let n = point.scale.len();
+        let v = point.vectors.as_ref();
+        let middle = Mat::from_fn(n, n, |i, k| v[(i, k)] * point.slope[k]);
+        let mut out = Mat::zeros(n, n);
+        let s = out.as_mut();
+        let (a, b) = (middle.as_ref(), v.transpose());
+        matmul(s, Accum::Replace, a, b, 1.0, Par::Seq);
+        self.back_through_scale(&mut out, &point.scaled, &point.scale);
+        out
     }
 
     /// One, or the inverse norm of each column.
@@ -171,6 +214,14 @@ impl Spectral {
             Self::LogWorst => {
                 slope[0] = -0.5 / small;
                 0.5 * (samples / small).ln()
+            }
+            Self::WorstNorm { power } => {
+                let down: Vec<f64> = lambda.iter().map(|l| (small / l).powf(power)).collect();
+                let sum: f64 = down.iter().sum();
+                for k in 0..n {
+                    slope[k] = -0.5 * down[k] / (sum * lambda[k]);
+                }
+                0.5 * ((samples / small).ln() + sum.ln() / power)
             }
         };
         (value, slope)

@@ -48,8 +48,8 @@ fn options() -> FourierOptions {
         criterion: Criterion::TwoNorm(Scaling::Raw),
         n_starts: 1,
         seed: 1,
-        max_evaluations: 60,
-        n_constraint_samples: 32,
+        max_evaluations: 300,
+        n_constraint_samples: 64,
     }
 }
 
@@ -117,7 +117,7 @@ fn identity_the_motion_does_not_depend_on_the_number_of_threads() {
     let (model, limits) = (Model::new(&robot), Limits::from_robot(&robot).unwrap());
     let options = FourierOptions {
         n_starts: 2,
-        max_evaluations: 8,
+        max_evaluations: 20,
         criterion: Criterion::LogDet,
         ..options()
     };
