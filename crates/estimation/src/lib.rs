@@ -5,7 +5,9 @@
 //!
 //! - [`InformationFactor`] folds rows in; [`solve`] and [`solve_with_known_noise`] read the answer.
 //! - [`weighted_least_squares`] weights the joints by the covariance of their residuals; [`NoiseCovariance`] whitens rows by hand.
-//! - [`ResidualStatistics`] says how well a model predicts, joint by joint.
+//! - [`robust_least_squares`] loses outliers, [`essential_parameters`] what the data do not need, [`total_least_squares`] finds drive gains.
+//! - [`physically_consistent`] asks whether real bodies could have the parameters, and which are most plausible.
+//! - [`ResidualStatistics`] says how well a model predicts, joint by joint; [`ljung_box`] whether its residual is white.
 //!
 //! ```
 //! use idim_estimation::{InformationFactor, Solution, solve};
@@ -25,9 +27,10 @@
 //! # Ok::<(), idim_estimation::Error>(())
 //! ```
 //!
-//! It knows no robots: rows come from the caller, `row = sample · n_joints + joint`. It regularises nothing and inverts no singular
+//! It knows no robots but the ten parameters of a body: rows come from the caller, `row = sample · n_joints + joint`. It regularises nothing and inverts no singular
 //! matrix in silence.
 
+mod autocorrelation;
 mod conditioning;
 mod consistency;
 mod error;
@@ -47,6 +50,9 @@ mod total;
 mod triangular;
 mod weighted;
 
+pub use autocorrelation::{
+    BlockScores, LjungBox, autocorrelation, effective_sample_size, ljung_box,
+};
 pub use conditioning::{
     ConditionNumber, NEAR_SINGULAR_CONDITION, condition_number, matrix_error_bound,
     observation_error_bound,
