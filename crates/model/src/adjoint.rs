@@ -2,9 +2,11 @@
 //!
 //! A bar marks the derivative of one scalar with respect to a quantity; it has that quantity's type.
 
+use crate::frame::outer;
 use crate::kinematics::{LinkMotion, Screw, Travel};
-use crate::lane::{Lane, V3, add, cross, dot, zero};
+use crate::lane::{Lane, V3, add, cross, dot, splat, times, zero};
 use crate::model::KernelJoint;
+use crate::newton_euler::tensor_times;
 
 /// Derivative with respect to a joint's position, velocity and acceleration.
 #[derive(Debug, Clone, Copy)]
@@ -53,8 +55,18 @@ fn turning_bar<T: Lane>(bar: &mut LinkMotion<T>, w: V3<T>, p: V3<T>) {
 #[inline(always)]
 fn double_cross_bar<T: Lane>(f: V3<T>, w: V3<T>, h: V3<T>) -> V3<T> {
     let (wh, wf, fh) = (dot(w, h), dot(w, f), dot(f, h));
-    let minus = -(fh + fh);
-    std::array::from_fn(|k| f[k].mul_add(wh, h[k].mul_add(wf, minus * w[k])))
+    let factor = -(fh + fh);
+    [
+        f[0].mul_add(wh, h[0].mul_add(wf, factor * w[0])),
+        f[1].mul_add(wh, h[1].mul_add(wf, factor * w[1])),
+        f[2].mul_add(wh, h[2].mul_add(wf, factor * w[2])),
+    ]
+}
+
+/// A vector carried through a turn moves by `-z × v dq`.
+#[inline(always)]
+fn turned_bar<T: Lane>(v: V3<T>, bar: V3<T>) -> T {
+    bar[0].mul_add(v[1], -(bar[1] * v[0]))
 }
 
 /// Reverse of [`LinkMotion::beyond`]: from the bar of a link's motion, the bar of the motion of the link below.
@@ -68,25 +80,17 @@ pub(crate) fn beyond_bar<T: Lane>(
     bar: LinkMotion<T>,
     out: &mut JointBar<T>,
 ) -> LinkMotion<T> {
-    let mut bar = bar.map(|v| joint.after.to_outer(v));
+    let mut bar = bar;
     let m = carried;
-    if joint.after.has_translation() {
-        let mut w = m.w;
-        if let Travel::Turn { .. } = travel {
-            w[2] = w[2] + qd;
-        }
-        turning_bar(&mut bar, w, joint.after.translation());
-    }
     match travel {
         Travel::Turn { .. } => {
             out.qdd = out.qdd + bar.wd[2];
             let coriolis = bar.wd[0].mul_add(m.w[1], -(bar.wd[1] * m.w[0]));
             out.qd = out.qd + coriolis + bar.w[2];
             bar.w[1] = bar.wd[0].mul_add(qd, bar.w[1]);
-            bar.w[0] = bar.wd[1].mul_add(-qd, bar.w[0]);
-            // A vector carried through the turn moves by -z × v dq.
-            let turned = |v: V3<T>, b: V3<T>| b[0].mul_add(v[1], -(b[1] * v[0]));
-            out.q = out.q + (turned(m.w, bar.w) + (turned(m.wd, bar.wd) + turned(m.a, bar.a)));
+            bar.w[0] = (-bar.wd[1]).mul_add(qd, bar.w[0]);
+            out.q = out.q
+                + (turned_bar(m.w, bar.w) + (turned_bar(m.wd, bar.wd) + turned_bar(m.a, bar.a)));
         }
         Travel::Slide { d } => {
             out.qdd = out.qdd + bar.a[2];
@@ -101,10 +105,31 @@ pub(crate) fn beyond_bar<T: Lane>(
             bar.w[0] = bar.a[1].mul_add(-twice, bar.w[0]);
         }
     }
-    let mut bar = bar.map(|v| joint.before.to_outer(travel.to_outer(v)));
-    if joint.before.has_translation() {
-        turning_bar(&mut bar, below_w, joint.before.translation());
+    let mut bar = LinkMotion {
+        w: travel.out_of_joint(joint, bar.w),
+        wd: travel.out_of_joint(joint, bar.wd),
+        a: travel.out_of_joint(joint, bar.a),
+    };
+    if joint.step.has_translation() {
+        turning_bar(&mut bar, below_w, joint.step.translation());
     }
+    bar
+}
+
+/// From the bar of the motion of a frame fixed in a link, the bar of the link's motion `m`.
+#[inline(always)]
+pub(crate) fn frame_bar<T: Lane>(
+    m: &LinkMotion<T>,
+    bar: LinkMotion<T>,
+    rotation: &[[f64; 3]; 3],
+    translation: [f64; 3],
+) -> LinkMotion<T> {
+    let mut bar = LinkMotion {
+        w: outer(rotation, bar.w),
+        wd: outer(rotation, bar.wd),
+        a: outer(rotation, bar.a),
+    };
+    turning_bar(&mut bar, m.w, splat(translation));
     bar
 }
 
@@ -115,20 +140,16 @@ pub(crate) fn wrench_bar<T: Lane>(
     twist: &Screw<T>,
     p: &[T; 10],
 ) -> LinkMotion<T> {
-    let tensor = |v: V3<T>| -> V3<T> {
-        [
-            dot([p[0], p[1], p[2]], v),
-            dot([p[1], p[3], p[4]], v),
-            dot([p[2], p[4], p[5]], v),
-        ]
-    };
     let (x, f, h) = (twist.angular, twist.linear, [p[6], p[7], p[8]]);
-    let gyroscopic = add(cross(tensor(m.w), x), tensor(cross(x, m.w)));
+    let gyroscopic = add(
+        cross(tensor_times(p, m.w), x),
+        tensor_times(p, cross(x, m.w)),
+    );
     let lever = cross(x, h);
     LinkMotion {
         w: add(gyroscopic, double_cross_bar(f, m.w, h)),
-        wd: add(tensor(x), cross(h, f)),
-        a: std::array::from_fn(|k| p[9].mul_add(f[k], lever[k])),
+        wd: add(tensor_times(p, x), cross(h, f)),
+        a: add(times(p[9], f), lever),
     }
 }
 
@@ -157,15 +178,6 @@ impl<T: Lane> Screw<T> {
         Self {
             angular: add(self.angular, o.angular),
             linear: add(self.linear, o.linear),
-        }
-    }
-
-    /// This axis times a rate.
-    #[inline(always)]
-    pub(crate) fn times(&self, rate: T) -> Self {
-        Self {
-            angular: self.angular.map(|x| x * rate),
-            linear: self.linear.map(|x| x * rate),
         }
     }
 }

@@ -1,11 +1,11 @@
 //! Energy, power and momentum, linear in the same parameters as the torque.
 
+use crate::frame::{LinkPose, inner, shift};
 use crate::kinematics::{Screw, Travel};
 use crate::lane::{Lane, cross, dot};
 use crate::model::Model;
 use crate::parameter::{Columns, ParameterKind};
 use crate::regressor::torque_regressor;
-use crate::robot::JointKind;
 use crate::states::JointState;
 use nalgebra::DMatrix;
 
@@ -117,41 +117,68 @@ pub(crate) fn link_energies<T: Lane>(model: &Model, q: &[T], qd: &[T], links: &m
     };
     let mut all: Vec<LinkEnergy<T>> = Vec::with_capacity(model.n_joints());
     for (j, joint) in model.joints.iter().enumerate() {
-        let travel = Travel::new(joint.kind, q[j]);
+        let travel = Travel::new(joint, q[j]);
         let below = joint.parent.map_or(base, |p| all[p]);
-        let mut velocity = below.velocity.beyond(joint, travel);
-        let axis = Screw::<T>::axis(joint);
-        for k in 0..3 {
-            velocity.angular[k] = axis.angular[k].mul_add(qd[j], velocity.angular[k]);
-            velocity.linear[k] = axis.linear[k].mul_add(qd[j], velocity.linear[k]);
-        }
-        let mut potential = below.potential - dot(below.gravity, joint.before.translation());
-        let mut gravity = travel.to_inner(joint.before.to_inner(below.gravity));
-        if let (JointKind::Prismatic, Travel::Slide { d }) = (joint.kind, travel) {
+        let gravity = travel.to_inner(joint.step.to_inner(below.gravity));
+        let mut potential = below.potential - dot(below.gravity, joint.step.translation());
+        if let Travel::Slide { d } = travel {
             potential = potential - gravity[2] * d;
         }
-        potential = potential - dot(gravity, joint.after.translation());
-        gravity = joint.after.to_inner(gravity);
-        all.push(LinkEnergy {
-            velocity,
+        let here = LinkEnergy {
+            velocity: below
+                .velocity
+                .beyond(joint, travel)
+                .plus_axis(joint.kind, qd[j]),
             gravity,
             potential,
-        });
+        };
+        all.push(here);
+        let ten = match &joint.link {
+            LinkPose::Along(_) => here.ten(),
+            LinkPose::Posed {
+                rotation,
+                translation,
+                ..
+            } => here.at(rotation, *translation).ten(),
+        };
+        for (k, x) in links[j].iter_mut().enumerate() {
+            let (from, sign) = joint.link.entry(k);
+            *x = ten[from] * T::splat(sign);
+        }
+    }
+}
+
+impl<T: Lane> LinkEnergy<T> {
+    /// At a frame that moves with the link.
+    fn at(&self, rotation: &[[f64; 3]; 3], translation: [f64; 3]) -> Self {
+        let linear = shift(translation, self.velocity.linear, self.velocity.angular);
+        Self {
+            velocity: Screw {
+                angular: inner(rotation, self.velocity.angular),
+                linear: inner(rotation, linear),
+            },
+            gravity: inner(rotation, self.gravity),
+            potential: self.potential - dot(self.gravity, translation.map(T::splat)),
+        }
+    }
+
+    /// Energy per unit of the ten parameters in this frame.
+    fn ten(&self) -> [T; 10] {
         let half = T::splat(0.5);
-        let [x, y, z] = velocity.angular;
-        let v = velocity.linear;
-        let first = cross(v, velocity.angular);
-        links[j] = [
+        let [x, y, z] = self.velocity.angular;
+        let v = self.velocity.linear;
+        let first = cross(v, self.velocity.angular);
+        [
             half * x * x,
             x * y,
             x * z,
             half * y * y,
             y * z,
             half * z * z,
-            first[0] - gravity[0],
-            first[1] - gravity[1],
-            first[2] - gravity[2],
-            half.mul_add(dot(v, v), potential),
-        ];
+            first[0] - self.gravity[0],
+            first[1] - self.gravity[1],
+            first[2] - self.gravity[2],
+            half.mul_add(dot(v, v), self.potential),
+        ]
     }
 }

@@ -4,14 +4,17 @@
 //! weights. A twist made of the weights goes out along the chain, wrenches and derivatives come back: about three inverse
 //! dynamics for all derivatives of a sample, and no derivative of Y is ever formed.
 
-use crate::adjoint::{JointBar, beyond_bar, wrench_bar};
+use crate::adjoint::{JointBar, beyond_bar, frame_bar, wrench_bar};
+use crate::frame::LinkPose;
 use crate::kinematics::{LinkMotion, Screw, Travel};
-use crate::lane::{F64x8, Lane, zero};
+use crate::lane::{F64x8, Lane, dispatch, zero};
 use crate::model::Model;
-use crate::newton_euler::{LaneStates, eight, link_wrench, splat_ten};
+use crate::newton_euler::{link_wrench, splat_ten};
 use crate::parameter::{Columns, ParameterKind};
-use crate::regressor::{Plan, RegressorBlock, fill, no_axis};
-use crate::states::JointStates;
+use crate::projection::{Kinematics, Plan};
+use crate::regressor::{Fill, RegressorBlock};
+use crate::states::{JointStates, LaneStates, eight};
+use crate::wrench_map::WrenchMap;
 
 /// Gradient of `Σ_t u_t · Y(q_t, q̇_t, q̈_t) v` with respect to every `q`, `q̇`, `q̈`, in the shape of the states.
 ///
@@ -36,10 +39,13 @@ pub fn torque_contraction_gradient(
         for j in 0..n {
             weights[j] = eight(&u[j * n_samples..][..n_samples], first);
         }
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || contract_torque(model, &terms, lanes, work, |_, joint, _| weights[joint]),
-        );
+        dispatch(TorqueContraction {
+            model,
+            terms: &terms,
+            state: lanes.state(),
+            work,
+            weight: Weight::Given(&weights),
+        });
     })
 }
 
@@ -69,14 +75,13 @@ pub fn squared_torque_gradient(
         .map(|(_, v)| Term::new(model, columns, v))
         .collect();
     over_lanes(model, states, |_, lanes, work| {
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                contract_torque(model, &terms, lanes, work, |term, joint, torque| {
-                    torque * F64x8::splat(factors[term * n + joint])
-                });
-            },
-        );
+        dispatch(TorqueContraction {
+            model,
+            terms: &terms,
+            state: lanes.state(),
+            work,
+            weight: Weight::TimesTorque(&factors),
+        });
     })
 }
 
@@ -98,30 +103,26 @@ pub fn regressor_contraction_gradient(
     let plan = Plan::new(model, columns);
     let mut y = RegressorBlock::new(n, columns.len());
     let mut g = y.clone();
-    let mut axes = vec![no_axis(); n * n];
-    let mut motions = vec![LinkMotion::base(model); n];
+    let mut kinematics = Kinematics::new(model);
     over_lanes(model, states, |first, lanes, work| {
         y.move_to(first, states.n_samples());
         g.move_to(first, states.n_samples());
-        let state = [&lanes.q[..], &lanes.qd, &lanes.qdd];
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                fill(
-                    model,
-                    &plan,
-                    state,
-                    &mut motions,
-                    &mut axes,
-                    y.entries_mut(),
-                );
-            },
-        );
+        dispatch(Fill {
+            model,
+            plan: &plan,
+            state: lanes.state(),
+            kinematics: &mut kinematics,
+            rows: y.entries_mut(),
+        });
         weigh(&y, &mut g);
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || contract_regressor(model, &plan, state, &axes, g.entries(), work),
-        );
+        dispatch(RegressorContraction {
+            model,
+            plan: &plan,
+            state: lanes.state(),
+            kinematics: &kinematics,
+            weights: g.entries(),
+            work,
+        });
     })
 }
 
@@ -157,7 +158,7 @@ fn over_lanes(
 
 /// One number a column, sorted to where the recursion wants it.
 struct Term {
-    /// Ten a link.
+    /// Ten a link, in the joint frames.
     inertial: Vec<f64>,
     /// For each joint: rotor inertia, viscous and Coulomb friction, offset.
     drive: Vec<[f64; 4]>,
@@ -182,12 +183,15 @@ impl Term {
                 None => term.drive[p.index][drive_position(p.kind)] += x,
             }
         }
+        term.inertial = model.kernel_parameters(&term.inertial);
         term
     }
 
     #[inline(always)]
     fn drive_torque<T: Lane>(&self, joint: usize, qd: T, qdd: T) -> T {
-        let [rotor, viscous, coulomb, offset] = self.drive[joint].map(T::splat);
+        let [rotor, viscous, coulomb, offset] = self.drive[joint];
+        let (rotor, viscous) = (T::splat(rotor), T::splat(viscous));
+        let (coulomb, offset) = (T::splat(coulomb), T::splat(offset));
         let friction = viscous.mul_add(qd, coulomb.mul_add(qd.sign(), offset));
         rotor.mul_add(qdd, friction)
     }
@@ -222,8 +226,8 @@ impl<T: Lane> Workspace<T> {
             carried: vec![LinkMotion::zero(); n],
             motion: vec![LinkMotion::zero(); n],
             bar: vec![LinkMotion::zero(); n],
-            wrench: vec![no_axis(); n],
-            twist: vec![no_axis(); n],
+            wrench: vec![Screw::zero(); n],
+            twist: vec![Screw::zero(); n],
             out: vec![JointBar::zero(); n],
         }
     }
@@ -233,11 +237,14 @@ impl<T: Lane> Workspace<T> {
     fn outward(&mut self, model: &Model, [q, qd, qdd]: [&[T]; 3]) {
         let base = LinkMotion::base(model);
         for (j, joint) in model.joints.iter().enumerate() {
-            let travel = Travel::new(joint.kind, q[j]);
-            let below = joint.parent.map_or(base, |p| self.motion[p]);
+            let travel = Travel::new(joint, q[j]);
+            let below = match joint.parent {
+                Some(p) => self.motion[p],
+                None => base,
+            };
             self.travel[j] = travel;
             self.carried[j] = below.carried(joint, travel);
-            self.motion[j] = self.carried[j].moved(joint, travel, qd[j], qdd[j]);
+            self.motion[j] = self.carried[j].moved(travel, qd[j], qdd[j]);
             self.bar[j] = LinkMotion::zero();
             self.out[j] = JointBar::zero();
         }
@@ -247,7 +254,10 @@ impl<T: Lane> Workspace<T> {
     #[inline(always)]
     fn inward(&mut self, model: &Model, qd: &[T]) {
         for (j, joint) in model.joints.iter().enumerate().rev() {
-            let below_w = joint.parent.map_or(zero(), |p| self.motion[p].w);
+            let below_w = match joint.parent {
+                Some(p) => self.motion[p].w,
+                None => zero(),
+            };
             let at_joint = (qd[j], &self.carried[j], below_w);
             let bar = beyond_bar(
                 joint,
@@ -263,105 +273,166 @@ impl<T: Lane> Workspace<T> {
     }
 }
 
-/// `weight(term, joint, torque)` is u; it may depend on the torque `Y v` itself.
-#[inline(always)]
-fn contract_torque(
-    model: &Model,
-    terms: &[Term],
-    lanes: &LaneStates,
-    work: &mut Workspace<F64x8>,
-    weight: impl Fn(usize, usize, F64x8) -> F64x8,
-) {
-    let state = [&lanes.q[..], &lanes.qd, &lanes.qdd];
-    contract_torque_of(model, terms, state, work, weight);
+/// The weights u of a torque: given, or a factor times the torque itself.
+enum Weight<'a, T> {
+    /// One a joint.
+    Given(&'a [T]),
+    /// At `term * n + joint`.
+    TimesTorque(&'a [f64]),
 }
 
-#[inline(always)]
-fn contract_torque_of<T: Lane>(
-    model: &Model,
-    terms: &[Term],
-    [q, qd, qdd]: [&[T]; 3],
-    work: &mut Workspace<T>,
-    weight: impl Fn(usize, usize, T) -> T,
-) {
-    let n = model.n_joints();
-    work.outward(model, [q, qd, qdd]);
-    for (t, term) in terms.iter().enumerate() {
-        // Wrench of everything a joint carries, by the parameters v.
-        for j in 0..n {
-            work.wrench[j] = link_wrench(&work.motion[j], &splat_ten(&term.inertial[10 * j..]));
-        }
-        for (j, joint) in model.joints.iter().enumerate().rev() {
-            if let Some(p) = joint.parent {
-                let passed = work.wrench[j].wrench_below(joint, work.travel[j]);
-                work.wrench[p] = work.wrench[p].plus(&passed);
-            }
-        }
-        // Twist of every link if the joints had the speeds u.
-        for (j, joint) in model.joints.iter().enumerate() {
-            let axis = Screw::axis(joint);
-            let torque = axis.power(&work.wrench[j]) + term.drive_torque(j, qd[j], qdd[j]);
-            let u = weight(t, j, torque);
-            let own = axis.times(u);
-            let twist = match joint.parent {
-                Some(p) => work.twist[p].beyond(joint, work.travel[j]).plus(&own),
-                None => own,
-            };
-            let out = &mut work.out[j];
-            out.q = out.q - axis.power(&twist.cross_wrench(&work.wrench[j]));
-            out.qd = T::splat(term.drive[j][1]).mul_add(u, out.qd);
-            out.qdd = T::splat(term.drive[j][0]).mul_add(u, out.qdd);
-            let own_bar = wrench_bar(
-                &work.motion[j],
-                &twist,
-                &splat_ten(&term.inertial[10 * j..]),
-            );
-            work.bar[j] = work.bar[j].plus(&own_bar);
-            work.twist[j] = twist;
-        }
-    }
-    work.inward(model, qd);
+struct TorqueContraction<'a, T> {
+    model: &'a Model,
+    terms: &'a [Term],
+    state: [&'a [T]; 3],
+    work: &'a mut Workspace<T>,
+    weight: Weight<'a, T>,
 }
 
-/// `axes` and `weights` as `fill` lays them out.
-#[inline(always)]
-fn contract_regressor<T: Lane>(
-    model: &Model,
-    plan: &Plan,
-    state: [&[T]; 3],
-    axes: &[Screw<T>],
-    weights: &[T],
-    work: &mut Workspace<T>,
-) {
-    let n = model.n_joints();
-    let p = plan.n_columns;
-    work.outward(model, state);
-    for (j, joint) in model.joints.iter().enumerate() {
-        let mut below: Screw<T> = no_axis();
-        for &i in &joint.path {
-            if plan.links[j].is_empty() {
-                break;
+impl<T: Lane> pulp::WithSimd for TorqueContraction<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let (work, joints) = (self.work, &self.model.joints);
+        let n = joints.len();
+        let [_, qd, qdd] = self.state;
+        work.outward(self.model, self.state);
+        for (t, term) in self.terms.iter().enumerate() {
+            // Wrench of everything a joint carries, by the parameters v.
+            for j in 0..n {
+                work.wrench[j] = link_wrench(&work.motion[j], &splat_ten(&term.inertial[10 * j..]));
             }
-            let mut parameters = [T::splat(0.0); 10];
-            for &(k, column) in &plan.links[j] {
-                parameters[k] = parameters[k] + weights[i * p + column];
+            for (j, joint) in joints.iter().enumerate().rev() {
+                if let Some(p) = joint.parent {
+                    let passed = work.wrench[j].wrench_below(joint, work.travel[j]);
+                    work.wrench[p] = work.wrench[p].plus(&passed);
+                }
             }
-            let axis = axes[j * n + i];
-            let wrench = link_wrench(&work.motion[j], &parameters);
-            // A turn of joint i moves the axes below it as this link sees them.
-            work.out[i].q = work.out[i].q - axis.power(&below);
-            below = below.plus(&axis.cross_wrench(&wrench));
-            work.bar[j] = work.bar[j].plus(&wrench_bar(&work.motion[j], &axis, &parameters));
+            // Twist of every link if the joints had the speeds u.
+            for (j, joint) in joints.iter().enumerate() {
+                let u = match self.weight {
+                    Weight::Given(u) => u[j],
+                    Weight::TimesTorque(factor) => {
+                        let inertial = work.wrench[j].along_axis(joint.kind);
+                        let torque = inertial + term.drive_torque(j, qd[j], qdd[j]);
+                        torque * T::splat(factor[t * n + j])
+                    }
+                };
+                let below = match joint.parent {
+                    Some(p) => work.twist[p].beyond(joint, work.travel[j]),
+                    None => Screw::zero(),
+                };
+                let twist = below.plus_axis(joint.kind, u);
+                let out = &mut work.out[j];
+                out.q = out.q - twist.cross_wrench(&work.wrench[j]).along_axis(joint.kind);
+                out.qd = T::splat(term.drive[j][1]).mul_add(u, out.qd);
+                out.qdd = T::splat(term.drive[j][0]).mul_add(u, out.qdd);
+                let ten = splat_ten(&term.inertial[10 * j..]);
+                let own = wrench_bar(&work.motion[j], &twist, &ten);
+                work.bar[j] = work.bar[j].plus(&own);
+                work.twist[j] = twist;
+            }
         }
-        for &(kind, column) in &plan.drives[j] {
-            let weight = weights[j * p + column];
-            let out = &mut work.out[j];
-            match kind {
-                ParameterKind::Ia => out.qdd = out.qdd + weight,
-                ParameterKind::Fv => out.qd = out.qd + weight,
-                _ => {}
-            }
-        }
+        work.inward(self.model, qd);
     }
-    work.inward(model, state[1]);
+}
+
+/// `kinematics` as `fill` left it; `weights` as it lays out the rows.
+struct RegressorContraction<'a, T> {
+    model: &'a Model,
+    plan: &'a Plan,
+    state: [&'a [T]; 3],
+    kinematics: &'a Kinematics<T>,
+    weights: &'a [T],
+    work: &'a mut Workspace<T>,
+}
+
+impl<T: Lane> pulp::WithSimd for RegressorContraction<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(mut self, _: S) {
+        self.work.outward(self.model, self.state);
+        for j in 0..self.model.n_joints() {
+            self.link(j);
+            for &(kind, column) in &self.plan.drives[j] {
+                let weight = self.weights[j * self.plan.n_columns + column];
+                let out = &mut self.work.out[j];
+                match kind {
+                    ParameterKind::Ia => out.qdd = out.qdd + weight,
+                    ParameterKind::Fv => out.qd = out.qd + weight,
+                    _ => {}
+                }
+            }
+        }
+        self.work.inward(self.model, self.state[1]);
+    }
+}
+
+impl<T: Lane> RegressorContraction<'_, T> {
+    /// Derivatives by way of the wrench of link `j`, in the frame its parameters are given in.
+    #[inline(always)]
+    fn link(&mut self, j: usize) {
+        let (joint, plan) = (&self.model.joints[j], &self.plan.links[j]);
+        if plan.is_empty() {
+            return;
+        }
+        let motion = match &joint.link {
+            LinkPose::Along(_) => self.work.motion[j],
+            LinkPose::Posed {
+                rotation,
+                translation,
+                ..
+            } => WrenchMap::new(&self.work.motion[j]).motion_at(rotation, *translation),
+        };
+        let mut bar = LinkMotion::zero();
+        let mut below: Screw<T> = Screw::zero();
+        for d in &joint.directions {
+            for &i in &joint.path[d.range.clone()] {
+                let ten = self.weights_of(j, i);
+                let axis = self.kinematics.axis(j, d, i);
+                let axis = match &joint.link {
+                    LinkPose::Along(_) => axis,
+                    LinkPose::Posed {
+                        rotation,
+                        translation,
+                        ..
+                    } => axis.at(rotation, *translation),
+                };
+                // A turn of joint i moves the axes below it as this link sees them.
+                let out = &mut self.work.out[i];
+                out.q = out.q - axis.power(&below);
+                below = below.plus(&axis.cross_wrench(&link_wrench(&motion, &ten)));
+                bar = bar.plus(&wrench_bar(&motion, &axis, &ten));
+            }
+        }
+        if let LinkPose::Posed {
+            rotation,
+            translation,
+            ..
+        } = &joint.link
+        {
+            bar = frame_bar(&self.work.motion[j], bar, rotation, *translation);
+        }
+        self.work.bar[j] = self.work.bar[j].plus(&bar);
+    }
+
+    /// The weights of row `i` in the columns of link `j`, as ten parameters.
+    #[inline(always)]
+    fn weights_of(&self, j: usize, i: usize) -> [T; 10] {
+        let row = &self.weights[i * self.plan.n_columns..][..self.plan.n_columns];
+        let mut ten = [T::splat(0.0); 10];
+        let plan = &self.plan.links[j];
+        for k in 0..10 {
+            ten[k] = plan.get(k, row);
+            for twin in &self.plan.twins {
+                if (twin.link, twin.entry) == (j, k) {
+                    let more = row[twin.column];
+                    ten[k] = ten[k] + if twin.negated { -more } else { more };
+                }
+            }
+        }
+        ten
+    }
 }

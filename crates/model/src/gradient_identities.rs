@@ -1,7 +1,6 @@
 //! Gradients against derivatives of the regressor by dual numbers.
 
-use crate::kinematics::LinkMotion;
-use crate::regressor::{Plan, fill, no_axis};
+use crate::projection::{Kinematics, Plan, fill};
 use crate::testing::{Dual, dual, robot_and_state};
 use crate::*;
 use proptest::prelude::*;
@@ -29,16 +28,9 @@ fn regressor_derivatives(model: &Model, columns: &Columns, s: &JointState) -> Ve
             };
             let (q, qd, qdd) = (seeded(0, &s.q), seeded(1, &s.qd), seeded(2, &s.qdd));
             let mut rows = vec![dual(0.0, 0.0); n * columns.len()];
-            let mut motions = vec![LinkMotion::base(model); n];
-            let mut axes = vec![no_axis(); n * n];
-            fill(
-                model,
-                &plan,
-                [&q, &qd, &qdd],
-                &mut motions,
-                &mut axes,
-                &mut rows,
-            );
+            let mut kinematics = Kinematics::new(model);
+            let state = [&q[..], &qd, &qdd];
+            fill(model, &plan, state, &mut kinematics, &mut rows);
             rows
         })
         .collect()

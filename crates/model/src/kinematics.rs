@@ -1,10 +1,11 @@
 //! The outward recursion: what every link of an arm feels of the motion of the joints below it.
 
-use crate::lane::{Lane, V3, add, cross, zero};
+use crate::frame::{Offset, shift};
+use crate::lane::{Lane, V3, add, cross, minus, splat, zero};
 use crate::model::{KernelJoint, Model};
 use crate::robot::JointKind;
 
-/// Motion of a link's frame, in its own axes.
+/// Motion of a link at its joint's frame, in the axes of that frame.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LinkMotion<T> {
     /// Angular velocity ω, rad/s.
@@ -33,10 +34,11 @@ pub(crate) enum Travel<T> {
 
 impl<T: Lane> Travel<T> {
     #[inline(always)]
-    pub(crate) fn new(kind: JointKind, q: T) -> Self {
-        match kind {
+    pub(crate) fn new(joint: &KernelJoint, q: T) -> Self {
+        match joint.kind {
             JointKind::Revolute => {
-                let (s, c) = q.sin_cos();
+                let Offset { quarters, rest } = joint.offset;
+                let (s, c) = (q + T::splat(rest)).sin_cos(quarters);
                 Self::Turn { s, c }
             }
             JointKind::Prismatic => Self::Slide { d: q },
@@ -54,6 +56,18 @@ impl<T: Lane> Travel<T> {
             ],
             Self::Slide { .. } => v,
         }
+    }
+
+    /// A vector of the joint below's frame in this joint's.
+    #[inline(always)]
+    pub(crate) fn into_joint(self, joint: &KernelJoint, v: V3<T>) -> V3<T> {
+        self.to_inner(joint.step.to_inner(v))
+    }
+
+    /// A vector of this joint's frame in that of the joint below.
+    #[inline(always)]
+    pub(crate) fn out_of_joint(self, joint: &KernelJoint, v: V3<T>) -> V3<T> {
+        joint.step.to_outer(self.to_outer(v))
     }
 
     /// `R v`.
@@ -83,40 +97,45 @@ impl<T: Lane> LinkMotion<T> {
         Self {
             w: zero(),
             wd: zero(),
-            a: model.gravity.map(|g| T::splat(-g)),
+            a: minus(splat(model.gravity)),
         }
     }
 
     /// Motion of the link a joint carries, from that of the link it stands on.
     #[inline(always)]
     pub(crate) fn beyond(&self, joint: &KernelJoint, travel: Travel<T>, qd: T, qdd: T) -> Self {
-        self.carried(joint, travel).moved(joint, travel, qd, qdd)
+        self.carried(joint, travel).moved(travel, qd, qdd)
     }
 
     /// Motion of the link below at the joint, in the joint's turned axes; the joint itself held still.
     #[inline(always)]
     pub(crate) fn carried(&self, joint: &KernelJoint, travel: Travel<T>) -> Self {
-        let mut a = self.a;
-        if joint.before.has_translation() {
-            a = add(a, turning(self, joint.before.translation()));
+        let mut m = *self;
+        if joint.step.has_translation() {
+            m.a = add(m.a, turning(self, joint.step.translation()));
         }
-        let inner = |v| travel.to_inner(joint.before.to_inner(v));
+        m.turned(joint, travel)
+    }
+
+    /// In the axes of the joint's frame.
+    #[inline(always)]
+    pub(crate) fn turned(&self, joint: &KernelJoint, travel: Travel<T>) -> Self {
         Self {
-            w: inner(self.w),
-            wd: inner(self.wd),
-            a: inner(a),
+            w: travel.into_joint(joint, self.w),
+            wd: travel.into_joint(joint, self.wd),
+            a: travel.into_joint(joint, self.a),
         }
     }
 
-    /// The joint's own motion on top of what carries it, at the link's frame.
+    /// The joint's own motion on top of what carries it.
     #[inline(always)]
-    pub(crate) fn moved(self, joint: &KernelJoint, travel: Travel<T>, qd: T, qdd: T) -> Self {
+    pub(crate) fn moved(self, travel: Travel<T>, qd: T, qdd: T) -> Self {
         let mut m = self;
         match travel {
             Travel::Turn { .. } => {
                 // ω × z q̇, then the joint's own motion about z.
                 m.wd[0] = m.w[1].mul_add(qd, m.wd[0]);
-                m.wd[1] = m.w[0].mul_add(-qd, m.wd[1]);
+                m.wd[1] = (-m.w[0]).mul_add(qd, m.wd[1]);
                 m.wd[2] = m.wd[2] + qdd;
                 m.w[2] = m.w[2] + qd;
             }
@@ -126,81 +145,69 @@ impl<T: Lane> LinkMotion<T> {
                 let coriolis = qd + qd;
                 m.a = add(m.a, moved);
                 m.a[0] = m.w[1].mul_add(coriolis, m.a[0]);
-                m.a[1] = m.w[0].mul_add(-coriolis, m.a[1]);
+                m.a[1] = (-m.w[0]).mul_add(coriolis, m.a[1]);
                 m.a[2] = m.a[2] + qdd;
             }
         }
-        if joint.after.has_translation() {
-            m.a = add(m.a, turning(&m, joint.after.translation()));
-        }
-        m.map(|v| joint.after.to_inner(v))
-    }
-
-    #[inline(always)]
-    pub(crate) fn map(self, f: impl Fn(V3<T>) -> V3<T>) -> Self {
-        Self {
-            w: f(self.w),
-            wd: f(self.wd),
-            a: f(self.a),
-        }
+        m
     }
 }
 
 impl<T: Lane> Screw<T> {
-    /// The joint's own axis in the frame of its link.
     #[inline(always)]
-    pub(crate) fn axis(joint: &KernelJoint) -> Self {
-        let (o, i) = (T::splat(0.0), T::splat(1.0));
-        let z = [o, o, i];
-        let (angular, linear) = match joint.kind {
-            JointKind::Revolute => (z, joint.after.shift(zero(), z)),
-            JointKind::Prismatic => (zero(), z),
-        };
+    pub(crate) fn zero() -> Self {
         Self {
-            angular: joint.after.to_inner(angular),
-            linear: joint.after.to_inner(linear),
+            angular: zero(),
+            linear: zero(),
         }
     }
 
-    /// A motion (velocity-like) of the link below, in the frame of the link the joint carries.
+    /// A motion (velocity-like) of the link below, in the frame of the joint.
     #[inline(always)]
     pub(crate) fn beyond(&self, joint: &KernelJoint, travel: Travel<T>) -> Self {
-        let shifted = joint.before.shift(self.linear, self.angular);
-        let inner = |v| travel.to_inner(joint.before.to_inner(v));
-        let angular = inner(self.angular);
-        let mut linear = inner(shifted);
+        let shifted = shift(joint.step.translation, self.linear, self.angular);
+        let angular = travel.into_joint(joint, self.angular);
+        let mut linear = travel.into_joint(joint, shifted);
         if let Travel::Slide { d } = travel {
             linear[0] = angular[1].mul_add(d, linear[0]);
-            linear[1] = angular[0].mul_add(-d, linear[1]);
+            linear[1] = (-angular[0]).mul_add(d, linear[1]);
         }
-        Self {
-            angular: joint.after.to_inner(angular),
-            linear: joint.after.to_inner(joint.after.shift(linear, angular)),
-        }
+        Self { angular, linear }
     }
 
-    /// A wrench (moment, force) at the link the joint carries, at the link below.
+    /// A wrench (moment, force) at the joint, in the frame of the joint below.
     #[inline(always)]
     pub(crate) fn wrench_below(&self, joint: &KernelJoint, travel: Travel<T>) -> Self {
-        let force = joint.after.to_outer(self.linear);
-        let moment = arm(&joint.after, joint.after.to_outer(self.angular), force);
-        let (mut moment, force) = (moment, force);
+        let (mut moment, force) = (self.angular, self.linear);
         if let Travel::Slide { d } = travel {
-            moment[0] = force[1].mul_add(-d, moment[0]);
+            moment[0] = (-force[1]).mul_add(d, moment[0]);
             moment[1] = force[0].mul_add(d, moment[1]);
         }
-        let outer = |v| joint.before.to_outer(travel.to_outer(v));
-        let force = outer(force);
+        let force = travel.out_of_joint(joint, force);
+        let moment = travel.out_of_joint(joint, moment);
+        // n + p × f.
         Self {
-            angular: arm(&joint.before, outer(moment), force),
+            angular: shift(joint.step.translation, moment, minus(force)),
             linear: force,
         }
     }
-}
 
-/// `n + p × f`.
-#[inline(always)]
-fn arm<T: Lane>(pose: &crate::model::FixedPose, n: V3<T>, f: V3<T>) -> V3<T> {
-    let minus = [-f[0], -f[1], -f[2]];
-    pose.shift(n, minus)
+    /// Torque or force of a wrench along the joint's own axis.
+    #[inline(always)]
+    pub(crate) fn along_axis(&self, kind: JointKind) -> T {
+        match kind {
+            JointKind::Revolute => self.angular[2],
+            JointKind::Prismatic => self.linear[2],
+        }
+    }
+
+    /// A speed of the joint on top of this motion.
+    #[inline(always)]
+    pub(crate) fn plus_axis(mut self, kind: JointKind, speed: T) -> Self {
+        match kind {
+            JointKind::Revolute => self.angular[2] = self.angular[2] + speed,
+            JointKind::Prismatic => self.linear[2] = self.linear[2] + speed,
+        }
+        self
+    }
 }

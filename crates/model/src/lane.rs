@@ -13,8 +13,8 @@ pub(crate) trait Lane:
     fn splat(x: f64) -> Self;
     /// `self · a + b`, rounded once.
     fn mul_add(self, a: Self, b: Self) -> Self;
-    /// Sine and cosine, rad.
-    fn sin_cos(self) -> (Self, Self);
+    /// Sine and cosine of an angle (rad) plus a number of quarter turns.
+    fn sin_cos(self, quarters: u64) -> (Self, Self);
     /// -1, 0 or 1.
     fn sign(self) -> Self;
 }
@@ -51,7 +51,11 @@ impl Neg for F64x8 {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(self.0.map(|x| -x))
+        let mut r = [0.0; 8];
+        for k in 0..8 {
+            r[k] = -self.0[k];
+        }
+        Self(r)
     }
 }
 
@@ -65,12 +69,12 @@ impl Lane for f64 {
         f64::mul_add(self, a, b)
     }
     #[inline(always)]
-    fn sin_cos(self) -> (Self, Self) {
+    fn sin_cos(self, quarters: u64) -> (Self, Self) {
         if self.abs() <= REDUCTION_LIMIT {
-            sin_cos_reduced(self)
-        } else {
-            f64::sin_cos(self)
+            return sin_cos_reduced(self, quarters);
         }
+        let (s, c) = f64::sin_cos(self);
+        quarters_further(s, c, quarters)
     }
     #[inline(always)]
     fn sign(self) -> Self {
@@ -92,22 +96,26 @@ impl Lane for F64x8 {
         Self(r)
     }
     #[inline(always)]
-    fn sin_cos(self) -> (Self, Self) {
+    fn sin_cos(self, quarters: u64) -> (Self, Self) {
         let (mut s, mut c) = ([0.0; 8], [0.0; 8]);
         for k in 0..8 {
-            (s[k], c[k]) = sin_cos_reduced(self.0[k]);
+            (s[k], c[k]) = sin_cos_reduced(self.0[k], quarters);
         }
         // A branch a lane would break the vector code; angles this large are rare, and done again one by one.
         if !self.0.iter().all(|x| x.abs() <= REDUCTION_LIMIT) {
             for k in 0..8 {
-                (s[k], c[k]) = Lane::sin_cos(self.0[k]);
+                (s[k], c[k]) = Lane::sin_cos(self.0[k], quarters);
             }
         }
         (Self(s), Self(c))
     }
     #[inline(always)]
     fn sign(self) -> Self {
-        Self(self.0.map(Lane::sign))
+        let mut r = [0.0; 8];
+        for k in 0..8 {
+            r[k] = self.0[k].sign();
+        }
+        Self(r)
     }
 }
 
@@ -124,7 +132,7 @@ const ROUND: f64 = 6_755_399_441_055_744.0;
 
 /// Sine and cosine on [-π/4, π/4] after reduction, the minimax polynomials of fdlibm (Sun Microsystems, 1993).
 #[inline(always)]
-fn sin_cos_reduced(x: f64) -> (f64, f64) {
+fn sin_cos_reduced(x: f64, quarters: u64) -> (f64, f64) {
     let shifted = x.mul_add(std::f64::consts::FRAC_2_PI, ROUND);
     let k = shifted - ROUND;
     let r = (-k).mul_add(HALF_PI[0], x);
@@ -145,19 +153,36 @@ fn sin_cos_reduced(x: f64) -> (f64, f64) {
         .mul_add(z, -1.388_888_888_887_411e-3)
         .mul_add(z, 4.166_666_666_666_66e-2);
     let cosine = (z * z).mul_add(c, (-0.5_f64).mul_add(z, 1.0));
-    let quadrant = shifted.to_bits();
-    let (a, b) = if quadrant & 1 == 0 {
+    quarters_further(sine, cosine, shifted.to_bits().wrapping_add(quarters))
+}
+
+/// Sine and cosine of an angle some quarter turns on.
+#[inline(always)]
+fn quarters_further(sine: f64, cosine: f64, quarters: u64) -> (f64, f64) {
+    let (a, b) = if quarters & 1 == 0 {
         (sine, cosine)
     } else {
         (cosine, sine)
     };
-    let flip_sine = (quadrant & 2) << 62;
-    let flip_cosine = (quadrant.wrapping_add(1) & 2) << 62;
+    let flip_sine = (quarters & 2) << 62;
+    let flip_cosine = (quarters.wrapping_add(1) & 2) << 62;
     (
         f64::from_bits(a.to_bits() ^ flip_sine),
         f64::from_bits(b.to_bits() ^ flip_cosine),
     )
 }
+
+/// Runs an operation compiled for the best instruction set of this machine.
+///
+/// The operation is a struct, not a closure: only its own method is certain to be inlined into the function that has
+/// the instructions.
+#[inline]
+pub(crate) fn dispatch<Op: pulp::WithSimd>(operation: Op) -> Op::Output {
+    pulp::Arch::new().dispatch(operation)
+}
+
+// The kernels below this line take no closures: a closure handed to a function of the standard library is compiled
+// without the instructions of its caller.
 
 /// Vector of three lanes.
 pub(crate) type V3<T> = [T; 3];
@@ -184,6 +209,24 @@ pub(crate) fn add<T: Lane>(a: V3<T>, b: V3<T>) -> V3<T> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
+/// `-a`.
+#[inline(always)]
+pub(crate) fn minus<T: Lane>(a: V3<T>) -> V3<T> {
+    [-a[0], -a[1], -a[2]]
+}
+
+/// `x a`.
+#[inline(always)]
+pub(crate) fn times<T: Lane>(x: T, a: V3<T>) -> V3<T> {
+    [x * a[0], x * a[1], x * a[2]]
+}
+
+/// A constant vector in every lane.
+#[inline(always)]
+pub(crate) fn splat<T: Lane>(a: [f64; 3]) -> V3<T> {
+    [T::splat(a[0]), T::splat(a[1]), T::splat(a[2])]
+}
+
 /// Zero vector.
 #[inline(always)]
 pub(crate) fn zero<T: Lane>() -> V3<T> {
@@ -198,18 +241,18 @@ mod tests {
     proptest! {
         #[test]
         fn identity_sine_and_cosine_agree_with_the_standard_library(x in -1.0e5..1.0e5_f64) {
-            let (s, c) = Lane::sin_cos(x);
+            let (s, c) = Lane::sin_cos(x, 0);
             let (s0, c0) = x.sin_cos();
             // Two units in the last place of 1.
             prop_assert!((s - s0).abs() <= 2.0 * f64::EPSILON && (c - c0).abs() <= 2.0 * f64::EPSILON);
         }
 
         #[test]
-        fn identity_eight_lanes_give_the_bits_of_one(x in -10.0..10.0_f64) {
+        fn identity_eight_lanes_give_the_bits_of_one(x in -10.0..10.0_f64, quarters in 0..4_u64) {
             let eight = F64x8([x, -x, x + 1.0, x - 1.0, x * 0.5, x * 3.0, 1.0e7 * x, 0.0]);
-            let (s, c) = eight.sin_cos();
+            let (s, c) = eight.sin_cos(quarters);
             for k in 0..8 {
-                let (s1, c1) = Lane::sin_cos(eight.0[k]);
+                let (s1, c1) = Lane::sin_cos(eight.0[k], quarters);
                 prop_assert_eq!(s.0[k].to_bits(), s1.to_bits());
                 prop_assert_eq!(c.0[k].to_bits(), c1.to_bits());
             }

@@ -29,6 +29,7 @@
 mod adjoint;
 mod energy;
 mod error;
+mod frame;
 mod gradient;
 #[cfg(test)]
 mod gradient_identities;
@@ -40,6 +41,7 @@ mod model;
 mod newton_euler;
 mod parameter;
 mod pose;
+mod projection;
 mod regressor;
 mod robot;
 mod robot_file;
@@ -48,6 +50,7 @@ mod suggestion;
 #[cfg(test)]
 mod testing;
 mod urdf;
+mod wrench_map;
 
 pub use energy::{energy_difference, energy_regressor, momentum_regressor, power_regressor};
 pub use error::Error;
@@ -60,7 +63,10 @@ pub use parameter::{
     Columns, DriveColumns, InertialParameters, Notation, Parameter, ParameterKind,
 };
 pub use pose::{Pose, SNAP_ANGLE, exact_sin_cos, snap_angle};
-pub use regressor::{RegressorBlock, observation_matrix, torque_regressor, visit_torque_regressor};
+pub use regressor::{
+    RegressorBlock, RegressorWorkspace, observation_matrix, torque_regressor,
+    torque_regressor_into, visit_torque_regressor,
+};
 pub use robot::{Actuator, Joint, JointKind, JointLimits, Link, Robot};
 pub use robot_file::{robot_from_ron, robot_to_ron};
 pub use states::{JointState, JointStates, random_states};

@@ -1,161 +1,100 @@
-//! What the equations need of a robot, constant: a tree of fixed poses around joints that move about or along z.
+//! What the equations need of a robot, constant: joint frames with z along the axis, chosen so that little is left to do.
+//!
+//! The axis of a joint fixes its frame but for a turn about z. That turn is chosen such that the rotation from one joint
+//! to the next is about x alone (the modified Denavit-Hartenberg form), most often by 0 or 90°; what is left of it is
+//! an offset of the joint's position. Zeros that follow from this structure are found here, once.
 
-use crate::lane::{Lane, V3};
+use crate::frame::{Fixed, LinkPose, Offset, Rotation, about_z};
 use crate::pose::Pose;
 use crate::robot::{JointKind, Robot};
 use nalgebra::{Matrix3, Vector3};
+use std::ops::Range;
 
 /// Constants of the equations of motion, made once from a [`Robot`].
-///
-/// Every joint becomes `link_parent_from_link = before · motion_z(q) · after`; zeros and quarter turns of the two
-/// fixed poses are found here once, so that the kernels skip them.
 #[derive(Debug, Clone)]
 pub struct Model {
     pub(crate) gravity: [f64; 3],
     pub(crate) joints: Vec<KernelJoint>,
 }
 
-/// A joint as the kernels see it.
+/// A joint as the kernels see it; its frame moves about or along its own z.
 #[derive(Debug, Clone)]
 pub(crate) struct KernelJoint {
     pub(crate) parent: Option<usize>,
+    pub(crate) children: Vec<usize>,
     pub(crate) kind: JointKind,
-    pub(crate) before: FixedPose,
-    pub(crate) after: FixedPose,
+    /// From the frame of the joint below (the base) to this one's at position zero.
+    pub(crate) step: Fixed,
+    /// Added to the position of a revolute joint.
+    pub(crate) offset: Offset,
+    /// The link's own frame, which its parameters are given in, seen from the joint's.
+    pub(crate) link: LinkPose,
     /// Joints from the base to this one, itself included: the rows this link's parameters appear in.
     pub(crate) path: Vec<usize>,
+    /// The path cut where the direction of the axes changes; the last one is this joint's own, z.
+    pub(crate) directions: Vec<Direction>,
+    /// Whether the link only ever turns about this joint's z.
+    pub(crate) planar: bool,
 }
 
-/// A constant pose with its structure found out.
+/// Joints on a link's path whose axes stay parallel.
 #[derive(Debug, Clone)]
-pub(crate) struct FixedPose {
-    rotation: FixedRotation,
-    pub(crate) translation: [f64; 3],
-}
-
-#[derive(Debug, Clone)]
-enum FixedRotation {
-    Identity,
-    /// Rotation about x by +90°.
-    QuarterX,
-    /// Rotation about x by -90°.
-    BackQuarterX,
-    /// Row-major matrix.
-    General([[f64; 3]; 3]),
-}
-
-/// Entries of a rotation this close to 0 or ±1 are what the maker meant: rounding of an angle, not a tilt.
-const EXACT: f64 = 4.0 * f64::EPSILON;
-
-impl FixedPose {
-    fn new(pose: &Pose) -> Self {
-        let clean = pose.rotation.map(|x| {
-            let near = x.round();
-            if (x - near).abs() < EXACT { near } else { x }
-        });
-        let quarter = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0);
-        let rotation = if clean == Matrix3::identity() {
-            FixedRotation::Identity
-        } else if clean == quarter {
-            FixedRotation::QuarterX
-        } else if clean == quarter.transpose() {
-            FixedRotation::BackQuarterX
-        } else {
-            FixedRotation::General(std::array::from_fn(|i| {
-                std::array::from_fn(|j| clean[(i, j)])
-            }))
-        };
-        Self {
-            rotation,
-            translation: pose.translation.into(),
-        }
-    }
-
-    /// `Rᵀ v`: a vector of the outer frame in the inner one.
-    #[inline(always)]
-    pub(crate) fn to_inner<T: Lane>(&self, v: V3<T>) -> V3<T> {
-        match &self.rotation {
-            FixedRotation::Identity => v,
-            FixedRotation::QuarterX => [v[0], v[2], -v[1]],
-            FixedRotation::BackQuarterX => [v[0], -v[2], v[1]],
-            FixedRotation::General(r) => std::array::from_fn(|k| {
-                let [a, b, c] = [r[0][k], r[1][k], r[2][k]].map(T::splat);
-                v[0].mul_add(a, v[1].mul_add(b, v[2] * c))
-            }),
-        }
-    }
-
-    /// `R v`: a vector of the inner frame in the outer one.
-    #[inline(always)]
-    pub(crate) fn to_outer<T: Lane>(&self, v: V3<T>) -> V3<T> {
-        match &self.rotation {
-            FixedRotation::Identity => v,
-            FixedRotation::QuarterX => [v[0], -v[2], v[1]],
-            FixedRotation::BackQuarterX => [v[0], v[2], -v[1]],
-            FixedRotation::General(r) => std::array::from_fn(|k| {
-                let [a, b, c] = r[k].map(T::splat);
-                v[0].mul_add(a, v[1].mul_add(b, v[2] * c))
-            }),
-        }
-    }
-
-    /// `w × p + v` with the pose's translation `p`: zero components cost nothing.
-    #[inline(always)]
-    pub(crate) fn shift<T: Lane>(&self, v: V3<T>, w: V3<T>) -> V3<T> {
-        let mut out = v;
-        let [px, py, pz] = self.translation;
-        if px != 0.0 {
-            let p = T::splat(px);
-            out[1] = w[2].mul_add(p, out[1]);
-            out[2] = w[1].mul_add(-p, out[2]);
-        }
-        if py != 0.0 {
-            let p = T::splat(py);
-            out[0] = w[2].mul_add(-p, out[0]);
-            out[2] = w[0].mul_add(p, out[2]);
-        }
-        if pz != 0.0 {
-            let p = T::splat(pz);
-            out[0] = w[1].mul_add(p, out[0]);
-            out[1] = w[0].mul_add(-p, out[1]);
-        }
-        out
-    }
-
-    /// Whether there is a translation at all.
-    #[inline(always)]
-    pub(crate) fn has_translation(&self) -> bool {
-        self.translation != [0.0; 3]
-    }
-
-    /// The translation in every lane.
-    #[inline(always)]
-    pub(crate) fn translation<T: Lane>(&self) -> V3<T> {
-        self.translation.map(T::splat)
-    }
+pub(crate) struct Direction {
+    /// Its place among the directions of the path, the same for every link further out.
+    pub(crate) index: usize,
+    /// Positions on the path.
+    pub(crate) range: Range<usize>,
+    /// A slide stands alone: its axis has no angular part to share.
+    pub(crate) kind: JointKind,
+    /// Never has a part along z of the link's joint.
+    pub(crate) across: bool,
 }
 
 impl Model {
     /// Constants of a robot.
     pub fn new(robot: &Robot) -> Self {
+        let steps = raw_steps(robot);
+        // The turn about z that suits the first joint each joint carries.
+        let turns: Vec<Matrix3<f64>> = (0..robot.n_joints())
+            .map(|j| {
+                let first = robot.joints().iter().position(|c| c.parent == Some(j));
+                first.map_or_else(Matrix3::identity, |c| turn_towards(&steps[c].rotation))
+            })
+            .collect();
         let mut joints: Vec<KernelJoint> = Vec::with_capacity(robot.n_joints());
         for (index, joint) in robot.joints().iter().enumerate() {
-            let align = rotation_from_z(&joint.axis);
-            let offset = match joint.kind {
-                JointKind::Revolute => Pose::from_rotation_z(joint.offset),
-                JointKind::Prismatic => Pose::from_translation(0.0, 0.0, joint.offset),
-            };
-            let mut path = joint
-                .parent
-                .map_or_else(Vec::new, |p| joints[p].path.clone());
-            path.push(index);
-            joints.push(KernelJoint {
-                parent: joint.parent,
-                kind: joint.kind,
-                before: FixedPose::new(&(joint.parent_from_joint * align * offset)),
-                after: FixedPose::new(&(align.inverse() * joint.joint_from_link)),
-                path,
-            });
+            let mut step = steps[index];
+            let mut turn = turns[index];
+            if let Some(p) = joint.parent {
+                joints[p].children.push(index);
+                let back = Pose {
+                    rotation: turns[p].transpose(),
+                    translation: Vector3::zeros(),
+                };
+                step = back * step;
+                if let Some(rest) = turn_after_x(&step.rotation) {
+                    step.rotation *= rest.transpose();
+                    turn = rest * turn;
+                }
+            }
+            if joint.kind == JointKind::Prismatic {
+                // A slide cannot take up a turn.
+                step.rotation *= turn;
+                turn = Matrix3::identity();
+            }
+            let after = axis_pose(&joint.axis).inverse() * joint.joint_from_link;
+            let link = Pose {
+                rotation: turns[index].transpose(),
+                translation: Vector3::zeros(),
+            } * after;
+            let below = joint.parent.map(|p| &joints[p]);
+            joints.push(KernelJoint::new(
+                (index, joint.kind, joint.parent),
+                below,
+                Fixed::new(&step),
+                Offset::new(&turn),
+                LinkPose::new(&link),
+            ));
         }
         Self {
             gravity: robot.gravity().into(),
@@ -180,10 +119,94 @@ impl Model {
             joints: self.joints.clone(),
         }
     }
+
+    /// Ten parameters a link, given in the link frames, in the joint frames of the kernels.
+    pub(crate) fn kernel_parameters(&self, parameters: &[f64]) -> Vec<f64> {
+        let ten = parameters.chunks_exact(10);
+        let moved = |(joint, ten): (&KernelJoint, &[f64])| joint.link.parameters(ten);
+        self.joints.iter().zip(ten).flat_map(moved).collect()
+    }
+}
+
+impl KernelJoint {
+    fn new(
+        (index, kind, parent): (usize, JointKind, Option<usize>),
+        below: Option<&Self>,
+        step: Fixed,
+        offset: Offset,
+        link: LinkPose,
+    ) -> Self {
+        let mut path = below.map_or_else(Vec::new, |b| b.path.clone());
+        let mut directions = below.map_or_else(Vec::new, |b| b.directions.clone());
+        path.push(index);
+        let here = path.len() - 1;
+        let turns = step.rotation != Rotation::None;
+        let n_below = directions.len();
+        for d in &mut directions {
+            let next = d.index + 1 == n_below;
+            d.across = (d.across && !turns) || (next && step.rotation == Rotation::Quarter);
+        }
+        match directions.last_mut() {
+            Some(last) if !turns && last.kind == kind && kind == JointKind::Revolute => {
+                last.range.end = here + 1;
+            }
+            _ => directions.push(Direction {
+                index: n_below,
+                range: here..here + 1,
+                kind,
+                across: false,
+            }),
+        }
+        let planar = below.is_none_or(|b| b.planar && step.rotation == Rotation::None);
+        Self {
+            parent,
+            children: Vec::new(),
+            kind,
+            step,
+            offset,
+            link,
+            path,
+            directions,
+            planar,
+        }
+    }
+}
+
+/// Pose of every joint's frame at position zero in that of the joint below, z along the axes, as the robot file has them.
+fn raw_steps(robot: &Robot) -> Vec<Pose> {
+    robot
+        .joints()
+        .iter()
+        .map(|joint| {
+            let below = joint.parent.map_or_else(Pose::identity, |p| {
+                let parent = &robot.joints()[p];
+                axis_pose(&parent.axis).inverse() * parent.joint_from_link
+            });
+            let offset = match joint.kind {
+                JointKind::Revolute => Pose::from_rotation_z(joint.offset),
+                JointKind::Prismatic => Pose::from_translation(0.0, 0.0, joint.offset),
+            };
+            below * joint.parent_from_joint * axis_pose(&joint.axis) * offset
+        })
+        .collect()
+}
+
+/// `Rz(a)` of `R = Rz(a) Rx(α) Rz(b)` with α between 0 and π; the identity where the axes are parallel.
+fn turn_towards(r: &Matrix3<f64>) -> Matrix3<f64> {
+    let (c, s) = (-r[(1, 2)], r[(0, 2)]);
+    if crate::frame::clean(c.abs().max(s.abs())) == 0.0 {
+        return Matrix3::identity();
+    }
+    about_z(c, s)
+}
+
+/// `Rz(b)` if the rotation is `Rx(α) Rz(b)`.
+fn turn_after_x(r: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    (crate::frame::clean(r[(0, 2)]) == 0.0).then(|| about_z(r[(0, 0)], -r[(0, 1)]))
 }
 
 /// A rotation that takes z to a unit axis; exact for the axes of the frame.
-fn rotation_from_z(axis: &Vector3<f64>) -> Pose {
+fn axis_pose(axis: &Vector3<f64>) -> Pose {
     let z = Vector3::z();
     let exact = [
         (z, Matrix3::identity()),

@@ -1,9 +1,9 @@
 //! Newton-Euler inverse dynamics.
 
 use crate::kinematics::{LinkMotion, Screw, Travel};
-use crate::lane::{F64x8, Lane, V3, add, cross, dot, zero};
+use crate::lane::{F64x8, Lane, V3, add, cross, dispatch, dot, times};
 use crate::model::Model;
-use crate::states::{JointState, JointStates};
+use crate::states::{JointState, JointStates, LaneStates};
 
 /// Joint torques of a motion, N·m (N for a prismatic joint).
 ///
@@ -21,22 +21,14 @@ pub fn inverse_dynamics(model: &Model, parameters: &[f64], state: &JointState) -
         model.n_joints(),
         "the state has another number of joints than the model"
     );
-    let mut work = Workspace::new(model);
     let mut torque = vec![0.0; model.n_joints()];
-    pulp::Arch::new().dispatch(
-        #[inline(always)]
-        || {
-            recursion(
-                model,
-                parameters,
-                &state.q,
-                &state.qd,
-                &state.qdd,
-                &mut work,
-                &mut torque,
-            );
-        },
-    );
+    dispatch(Recursion {
+        model,
+        parameters: &model.kernel_parameters(parameters),
+        state: [&state.q, &state.qd, &state.qdd],
+        work: &mut Workspace::new(model),
+        torque: &mut torque,
+    });
     torque
 }
 
@@ -53,20 +45,20 @@ pub fn inverse_dynamics_batch(model: &Model, parameters: &[f64], states: &JointS
         n,
         "the states have another number of joints than the model"
     );
+    let parameters = model.kernel_parameters(parameters);
     let mut torque = vec![0.0; n * n_samples];
     let mut work = Workspace::new(model);
     let mut lanes = LaneStates::new(n);
     let mut out = vec![F64x8::ZERO; n];
     for first in (0..n_samples).step_by(8) {
         lanes.load(states, first);
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                recursion(
-                    model, parameters, &lanes.q, &lanes.qd, &lanes.qdd, &mut work, &mut out,
-                );
-            },
-        );
+        dispatch(Recursion {
+            model,
+            parameters: &parameters,
+            state: lanes.state(),
+            work: &mut work,
+            torque: &mut out,
+        });
         let count = (n_samples - first).min(8);
         for j in 0..n {
             torque[j * n_samples + first..][..count].copy_from_slice(&out[j].0[..count]);
@@ -84,39 +76,6 @@ fn assert_parameters(model: &Model, parameters: &[f64]) {
     );
 }
 
-/// Eight samples of every joint, the last sample repeated where there are fewer.
-pub(crate) struct LaneStates {
-    pub(crate) q: Vec<F64x8>,
-    pub(crate) qd: Vec<F64x8>,
-    pub(crate) qdd: Vec<F64x8>,
-}
-
-impl LaneStates {
-    pub(crate) fn new(n_joints: usize) -> Self {
-        let zeros = vec![F64x8::ZERO; n_joints];
-        Self {
-            q: zeros.clone(),
-            qd: zeros.clone(),
-            qdd: zeros,
-        }
-    }
-
-    pub(crate) fn load(&mut self, states: &JointStates, first: usize) {
-        for j in 0..states.n_joints() {
-            self.q[j] = eight(states.q(j), first);
-            self.qd[j] = eight(states.qd(j), first);
-            self.qdd[j] = eight(states.qdd(j), first);
-        }
-    }
-}
-
-pub(crate) fn eight(x: &[f64], first: usize) -> F64x8 {
-    if let Some(full) = x[first..].first_chunk::<8>() {
-        return F64x8(*full);
-    }
-    F64x8(std::array::from_fn(|k| x[(first + k).min(x.len() - 1)]))
-}
-
 struct Workspace<T> {
     motion: Vec<LinkMotion<T>>,
     travel: Vec<Travel<T>>,
@@ -126,48 +85,48 @@ struct Workspace<T> {
 impl<T: Lane> Workspace<T> {
     fn new(model: &Model) -> Self {
         let n = model.n_joints();
-        let rest = Screw {
-            angular: zero(),
-            linear: zero(),
-        };
         Self {
-            motion: vec![LinkMotion::base(model); n],
+            motion: vec![LinkMotion::zero(); n],
             travel: vec![Travel::Slide { d: T::splat(0.0) }; n],
-            wrench: vec![rest; n],
+            wrench: vec![Screw::zero(); n],
         }
     }
 }
 
-#[inline(always)]
-fn recursion<T: Lane>(
-    model: &Model,
-    parameters: &[f64],
-    q: &[T],
-    qd: &[T],
-    qdd: &[T],
-    work: &mut Workspace<T>,
-    torque: &mut [T],
-) {
-    let n = model.n_joints();
-    let base = LinkMotion::base(model);
-    for (j, joint) in model.joints.iter().enumerate() {
-        let travel = Travel::new(joint.kind, q[j]);
-        let below = joint.parent.map_or(base, |p| work.motion[p]);
-        let motion = below.beyond(joint, travel, qd[j], qdd[j]);
-        work.wrench[j] = link_wrench(&motion, &splat_ten(&parameters[10 * j..]));
-        work.motion[j] = motion;
-        work.travel[j] = travel;
-    }
-    for j in (0..n).rev() {
-        let joint = &model.joints[j];
-        let axis = Screw::axis(joint);
-        let wrench = work.wrench[j];
-        torque[j] = dot(axis.angular, wrench.angular) + dot(axis.linear, wrench.linear);
-        if let Some(p) = joint.parent {
-            let passed = wrench.wrench_below(joint, work.travel[j]);
-            let sum = &mut work.wrench[p];
-            sum.angular = add(sum.angular, passed.angular);
-            sum.linear = add(sum.linear, passed.linear);
+/// Outward for motions, inward for wrenches; `parameters` in the joint frames.
+struct Recursion<'a, T> {
+    model: &'a Model,
+    parameters: &'a [f64],
+    state: [&'a [T]; 3],
+    work: &'a mut Workspace<T>,
+    torque: &'a mut [T],
+}
+
+impl<T: Lane> pulp::WithSimd for Recursion<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let ([q, qd, qdd], work) = (self.state, self.work);
+        let base = LinkMotion::base(self.model);
+        for (j, joint) in self.model.joints.iter().enumerate() {
+            let travel = Travel::new(joint, q[j]);
+            let below = match joint.parent {
+                Some(p) => work.motion[p],
+                None => base,
+            };
+            let motion = below.beyond(joint, travel, qd[j], qdd[j]);
+            work.wrench[j] = link_wrench(&motion, &splat_ten(&self.parameters[10 * j..]));
+            work.motion[j] = motion;
+            work.travel[j] = travel;
+        }
+        for (j, joint) in self.model.joints.iter().enumerate().rev() {
+            let wrench = work.wrench[j];
+            self.torque[j] = wrench.along_axis(joint.kind);
+            if let Some(p) = joint.parent {
+                let passed = wrench.wrench_below(joint, work.travel[j]);
+                work.wrench[p] = work.wrench[p].plus(&passed);
+            }
         }
     }
 }
@@ -175,26 +134,33 @@ fn recursion<T: Lane>(
 /// The ten parameters of a link in every lane.
 #[inline(always)]
 pub(crate) fn splat_ten<T: Lane>(parameters: &[f64]) -> [T; 10] {
-    std::array::from_fn(|k| T::splat(parameters[k]))
+    let mut ten = [T::splat(0.0); 10];
+    for k in 0..10 {
+        ten[k] = T::splat(parameters[k]);
+    }
+    ten
+}
+
+/// `I v` with the tensor of the first six parameters.
+#[inline(always)]
+pub(crate) fn tensor_times<T: Lane>(p: &[T; 10], v: V3<T>) -> V3<T> {
+    [
+        dot([p[0], p[1], p[2]], v),
+        dot([p[1], p[3], p[4]], v),
+        dot([p[2], p[4], p[5]], v),
+    ]
 }
 
 /// Newton and Euler about the frame's origin: `n = I ω̇ + ω × I ω + h × a`, `f = m a + ω̇ × h + ω × (ω × h)`.
 #[inline(always)]
 pub(crate) fn link_wrench<T: Lane>(m: &LinkMotion<T>, p: &[T; 10]) -> Screw<T> {
-    let tensor = |v: V3<T>| -> V3<T> {
-        [
-            dot([p[0], p[1], p[2]], v),
-            dot([p[1], p[3], p[4]], v),
-            dot([p[2], p[4], p[5]], v),
-        ]
-    };
     let h = [p[6], p[7], p[8]];
-    let moment = add(tensor(m.wd), add(cross(m.w, tensor(m.w)), cross(h, m.a)));
+    let euler = add(tensor_times(p, m.wd), cross(m.w, tensor_times(p, m.w)));
+    let moment = add(euler, cross(h, m.a));
     let turning = add(cross(m.wd, h), cross(m.w, cross(m.w, h)));
-    let force = std::array::from_fn(|k| p[9].mul_add(m.a[k], turning[k]));
     Screw {
         angular: moment,
-        linear: force,
+        linear: add(times(p[9], m.a), turning),
     }
 }
 
@@ -208,14 +174,12 @@ pub(crate) fn torque_of<T: Lane>(
     qdd: &[T],
 ) -> Vec<T> {
     let mut torque = vec![T::splat(0.0); model.n_joints()];
-    recursion(
+    dispatch(Recursion {
         model,
-        parameters,
-        q,
-        qd,
-        qdd,
-        &mut Workspace::new(model),
-        &mut torque,
-    );
+        parameters: &model.kernel_parameters(parameters),
+        state: [q, qd, qdd],
+        work: &mut Workspace::new(model),
+        torque: &mut torque,
+    });
     torque
 }

@@ -1,14 +1,10 @@
-//! The torque regressor: joint torque per unit of each parameter, by projection of the joint axes.
-//!
-//! Entry (joint i, link j) is the axis of joint i, carried out to the frame of link j (six numbers), times the 6 × 10
-//! map of that link's parameters to its wrench. Only axes travel along the chain.
+//! The torque regressor: joint torque per unit of each parameter, for one sample and in blocks of eight.
 
-use crate::kinematics::{LinkMotion, Screw, Travel};
-use crate::lane::{F64x8, Lane, V3, dot};
+use crate::lane::{F64x8, Lane, dispatch};
 use crate::model::Model;
-use crate::newton_euler::LaneStates;
-use crate::parameter::{Columns, ParameterKind};
-use crate::states::{JointState, JointStates};
+use crate::parameter::Columns;
+use crate::projection::{Kinematics, Plan, fill};
+use crate::states::{JointState, JointStates, LaneStates};
 use nalgebra::DMatrix;
 
 /// Joint torque per unit of each parameter, `n × p`.
@@ -28,24 +24,66 @@ pub fn torque_regressor(model: &Model, columns: &Columns, state: &JointState) ->
         n,
         "the state has another number of joints than the model"
     );
-    let plan = Plan::new(model, columns);
-    let mut axes = vec![no_axis(); n * n];
-    let mut motions = vec![LinkMotion::base(model); n];
     let mut rows = vec![0.0; n * columns.len()];
-    pulp::Arch::new().dispatch(
-        #[inline(always)]
-        || {
-            fill(
-                model,
-                &plan,
-                [&state.q, &state.qd, &state.qdd],
-                &mut motions,
-                &mut axes,
-                &mut rows,
-            );
-        },
-    );
+    RegressorWorkspace::new(model, columns).fill_rows(model, state, &mut rows);
     DMatrix::from_row_slice(n, columns.len(), &rows)
+}
+
+/// Room for [`torque_regressor_into`], and the plan of the columns: made once, used for many samples.
+#[derive(Debug, Clone)]
+pub struct RegressorWorkspace {
+    plan: Plan,
+    kinematics: Kinematics<f64>,
+}
+
+impl RegressorWorkspace {
+    /// For a model and the columns wanted.
+    ///
+    /// # Panics
+    /// If a column does not fit the model.
+    #[track_caller]
+    pub fn new(model: &Model, columns: &Columns) -> Self {
+        Self {
+            plan: Plan::new(model, columns),
+            kinematics: Kinematics::new(model),
+        }
+    }
+
+    fn fill_rows(&mut self, model: &Model, state: &JointState, rows: &mut [f64]) {
+        dispatch(Fill {
+            model,
+            plan: &self.plan,
+            state: [&state.q, &state.qd, &state.qdd],
+            kinematics: &mut self.kinematics,
+            rows,
+        });
+    }
+}
+
+/// [`torque_regressor`] of one sample into `out`, `n × p` row by row, without allocating.
+///
+/// # Panics
+/// If `out`, the state or the workspace do not fit the model.
+#[track_caller]
+pub fn torque_regressor_into(
+    model: &Model,
+    workspace: &mut RegressorWorkspace,
+    state: &JointState,
+    out: &mut [f64],
+) {
+    let n = model.n_joints();
+    assert_eq!(
+        (state.q.len(), workspace.plan.links.len()),
+        (n, n),
+        "the state or the workspace has another number of joints than the model"
+    );
+    assert_eq!(
+        out.len(),
+        n * workspace.plan.n_columns,
+        "out is not joints × columns"
+    );
+    out.fill(0.0);
+    workspace.fill_rows(model, state, out);
 }
 
 /// Up to eight consecutive samples of the torque regressor.
@@ -149,26 +187,18 @@ pub fn visit_torque_regressor(
     );
     let plan = Plan::new(model, columns);
     let mut lanes = LaneStates::new(n);
-    let mut axes = vec![no_axis(); n * n];
-    let mut motions = vec![LinkMotion::base(model); n];
+    let mut kinematics = Kinematics::new(model);
     let mut block = RegressorBlock::new(n, columns.len());
     for first in (0..states.n_samples()).step_by(RegressorBlock::LANES) {
         block.move_to(first, states.n_samples());
         lanes.load(states, first);
-        pulp::Arch::new().dispatch(
-            #[inline(always)]
-            || {
-                let state = [&lanes.q[..], &lanes.qd, &lanes.qdd];
-                fill(
-                    model,
-                    &plan,
-                    state,
-                    &mut motions,
-                    &mut axes,
-                    &mut block.entries,
-                );
-            },
-        );
+        dispatch(Fill {
+            model,
+            plan: &plan,
+            state: lanes.state(),
+            kinematics: &mut kinematics,
+            rows: &mut block.entries,
+        });
         visit(&block);
     }
 }
@@ -196,146 +226,26 @@ pub fn observation_matrix(model: &Model, columns: &Columns, states: &JointStates
     w
 }
 
-/// Which entry of which link goes to which column, found once.
-pub(crate) struct Plan {
-    pub(crate) n_columns: usize,
-    /// For each link: (position among the ten, column).
-    pub(crate) links: Vec<Vec<(usize, usize)>>,
-    /// For each joint: (drive kind, column).
-    pub(crate) drives: Vec<Vec<(ParameterKind, usize)>>,
+/// [`fill`] as one operation to be compiled for an instruction set.
+pub(crate) struct Fill<'a, T> {
+    pub(crate) model: &'a Model,
+    pub(crate) plan: &'a Plan,
+    pub(crate) state: [&'a [T]; 3],
+    pub(crate) kinematics: &'a mut Kinematics<T>,
+    pub(crate) rows: &'a mut [T],
 }
 
-impl Plan {
-    #[track_caller]
-    pub(crate) fn new(model: &Model, columns: &Columns) -> Self {
-        let n = model.n_joints();
-        let mut plan = Self {
-            n_columns: columns.len(),
-            links: vec![Vec::new(); n],
-            drives: vec![Vec::new(); n],
-        };
-        for (column, p) in columns.0.iter().enumerate() {
-            assert!(
-                p.index < n,
-                "column {p} names a link the model does not have"
-            );
-            match p.kind.inertial_index() {
-                Some(k) => plan.links[p.index].push((k, column)),
-                None => plan.drives[p.index].push((p.kind, column)),
-            }
-        }
-        plan
-    }
-}
+impl<T: Lane> pulp::WithSimd for Fill<'_, T> {
+    type Output = ();
 
-pub(crate) fn no_axis<T: Lane>() -> Screw<T> {
-    Screw {
-        angular: [T::splat(0.0); 3],
-        linear: [T::splat(0.0); 3],
-    }
-}
-
-/// Writes the entries that can be other than zero; `rows` is `n × p`, joint by joint.
-#[inline(always)]
-pub(crate) fn fill<T: Lane>(
-    model: &Model,
-    plan: &Plan,
-    [q, qd, qdd]: [&[T]; 3],
-    motions: &mut [LinkMotion<T>],
-    axes: &mut [Screw<T>],
-    rows: &mut [T],
-) {
-    let n = model.n_joints();
-    let p = plan.n_columns;
-    let base = LinkMotion::base(model);
-    for (j, joint) in model.joints.iter().enumerate() {
-        let travel = Travel::new(joint.kind, q[j]);
-        let below = joint.parent.map_or(base, |k| motions[k]);
-        motions[j] = below.beyond(joint, travel, qd[j], qdd[j]);
-        if let Some(k) = joint.parent {
-            for &i in &model.joints[k].path {
-                axes[j * n + i] = axes[k * n + i].beyond(joint, travel);
-            }
-        }
-        axes[j * n + j] = Screw::axis(joint);
-        if !plan.links[j].is_empty() {
-            let map = WrenchMap::new(&motions[j]);
-            for &i in &joint.path {
-                let entries = map.project(&axes[j * n + i]);
-                for &(k, column) in &plan.links[j] {
-                    rows[i * p + column] = entries[k];
-                }
-            }
-        }
-        for &(kind, column) in &plan.drives[j] {
-            rows[j * p + column] = match kind {
-                ParameterKind::Ia => qdd[j],
-                ParameterKind::Fv => qd[j],
-                ParameterKind::Fc => qd[j].sign(),
-                _ => T::splat(1.0),
-            };
-        }
-    }
-}
-
-/// The map of a link's ten parameters to its wrench, with what its entries share computed once.
-pub(crate) struct WrenchMap<T> {
-    m: LinkMotion<T>,
-    /// `[ω̇]× + [ω]×[ω]×`: force per first moment.
-    b: [V3<T>; 3],
-    /// `ωx ωy`, `ωx ωz`, `ωy ωz`.
-    xy: T,
-    xz: T,
-    yz: T,
-    /// `ωx² - ωy²`, `ωz² - ωx²`, `ωy² - ωz²`.
-    x_y: T,
-    z_x: T,
-    y_z: T,
-}
-
-impl<T: Lane> WrenchMap<T> {
     #[inline(always)]
-    pub(crate) fn new(m: &LinkMotion<T>) -> Self {
-        let [x, y, z] = m.w;
-        let [dx, dy, dz] = m.wd;
-        let (xx, yy, zz) = (x * x, y * y, z * z);
-        let (xy, xz, yz) = (x * y, x * z, y * z);
-        Self {
-            m: *m,
-            b: [
-                [-(yy + zz), xy - dz, xz + dy],
-                [xy + dz, -(xx + zz), yz - dx],
-                [xz - dy, yz + dx, -(xx + yy)],
-            ],
-            xy,
-            xz,
-            yz,
-            x_y: xx - yy,
-            z_x: zz - xx,
-            y_z: yy - zz,
-        }
-    }
-
-    /// Axis times map: the ten entries of one row for this link.
-    #[inline(always)]
-    pub(crate) fn project(&self, axis: &Screw<T>) -> [T; 10] {
-        let [x, y, z] = axis.angular;
-        let f = axis.linear;
-        let [dx, dy, dz] = self.m.wd;
-        let [ax, ay, az] = self.m.a;
-        let b = &self.b;
-        let force = |k: usize| f[0].mul_add(b[0][k], f[1].mul_add(b[1][k], f[2] * b[2][k]));
-        [
-            x.mul_add(dx, y.mul_add(self.xz, -(z * self.xy))),
-            z.mul_add(self.x_y, y.mul_add(b[2][1], -(x * b[2][0]))),
-            y.mul_add(self.z_x, x.mul_add(b[1][0], -(z * b[1][2]))),
-            y.mul_add(dy, z.mul_add(self.xy, -(x * self.yz))),
-            x.mul_add(self.y_z, z.mul_add(b[0][2], -(y * b[0][1]))),
-            z.mul_add(dz, x.mul_add(self.yz, -(y * self.xz))),
-            z.mul_add(ay, (-y).mul_add(az, force(0))),
-            x.mul_add(az, (-z).mul_add(ax, force(1))),
-            y.mul_add(ax, (-x).mul_add(ay, force(2))),
-            dot(f, self.m.a),
-        ]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        fill(
+            self.model,
+            self.plan,
+            self.state,
+            self.kinematics,
+            self.rows,
+        );
     }
 }

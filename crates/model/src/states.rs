@@ -1,5 +1,6 @@
 //! Joint states: one, and many.
 
+use crate::lane::F64x8;
 use crate::robot::Robot;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -154,6 +155,44 @@ impl JointStates {
             qdd: pick(&self.qdd),
         }
     }
+}
+
+/// Eight samples of every joint, the last sample repeated where there are fewer.
+pub(crate) struct LaneStates {
+    q: Vec<F64x8>,
+    qd: Vec<F64x8>,
+    qdd: Vec<F64x8>,
+}
+
+impl LaneStates {
+    pub(crate) fn new(n_joints: usize) -> Self {
+        let zeros = vec![F64x8::ZERO; n_joints];
+        Self {
+            q: zeros.clone(),
+            qd: zeros.clone(),
+            qdd: zeros,
+        }
+    }
+
+    /// Positions, velocities and accelerations, one lane a joint.
+    pub(crate) fn state(&self) -> [&[F64x8]; 3] {
+        [&self.q, &self.qd, &self.qdd]
+    }
+
+    pub(crate) fn load(&mut self, states: &JointStates, first: usize) {
+        for j in 0..states.n_joints() {
+            self.q[j] = eight(states.q(j), first);
+            self.qd[j] = eight(states.qd(j), first);
+            self.qdd[j] = eight(states.qdd(j), first);
+        }
+    }
+}
+
+pub(crate) fn eight(x: &[f64], first: usize) -> F64x8 {
+    if let Some(full) = x[first..].first_chunk::<8>() {
+        return F64x8(*full);
+    }
+    F64x8(std::array::from_fn(|k| x[(first + k).min(x.len() - 1)]))
 }
 
 /// Span of a prismatic joint (m) drawn from where the robot states no position limits.

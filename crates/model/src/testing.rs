@@ -50,8 +50,8 @@ impl Lane for Dual {
     fn mul_add(self, a: Self, b: Self) -> Self {
         self * a + b
     }
-    fn sin_cos(self) -> (Self, Self) {
-        let (s, c) = self.re.sin_cos();
+    fn sin_cos(self, quarters: u64) -> (Self, Self) {
+        let (s, c) = Lane::sin_cos(self.re, quarters);
         (dual(s, c * self.du), dual(c, -s * self.du))
     }
     fn sign(self) -> Self {
@@ -98,13 +98,14 @@ fn body(i: usize, (slide, parent, x, style): &(bool, usize, [f64; 32], u8)) -> (
     // The special structures the kernels know, and the general case.
     let (before, after, axis) = match style {
         0 => (
-            Pose::from_rotation_x(1.5707963267948966),
+            Pose::from_rotation_x(std::f64::consts::FRAC_PI_2),
             Pose::identity(),
             Vector3::z(),
         ),
         1 => (
             Pose::identity(),
-            Pose::from_translation(0.0, x[1], x[2]) * Pose::from_rotation_x(-1.5707963267948966),
+            Pose::from_translation(0.0, x[1], x[2])
+                * Pose::from_rotation_x(-std::f64::consts::FRAC_PI_2),
             -Vector3::y(),
         ),
         2 => (pose(0), Pose::identity(), -Vector3::x()),

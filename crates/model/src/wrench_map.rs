@@ -1,0 +1,206 @@
+//! The 6 × 10 map of a link's parameters to its wrench, entry by entry against an axis.
+
+use crate::frame::{inner, shift};
+use crate::kinematics::{LinkMotion, Screw};
+use crate::lane::{Lane, V3, dot};
+
+/// The map of a link's ten parameters to its wrench, with what its entries share computed once.
+///
+/// Entries count as the parameters: the tensor's six, then `MX MY MZ M`. Axis: angular part `v`, linear part `f`.
+pub(crate) struct WrenchMap<T> {
+    m: LinkMotion<T>,
+    /// `[ω̇]× + [ω]×[ω]×`: force per first moment.
+    b: [V3<T>; 3],
+    /// `ωx ωy`, `ωx ωz`, `ωy ωz`.
+    xy: T,
+    xz: T,
+    yz: T,
+    /// `ωx² - ωy²`, `ωz² - ωx²`, `ωy² - ωz²`.
+    x_y: T,
+    z_x: T,
+    y_z: T,
+}
+
+impl<T: Lane> WrenchMap<T> {
+    #[inline(always)]
+    pub(crate) fn new(m: &LinkMotion<T>) -> Self {
+        let [x, y, z] = m.w;
+        let [dx, dy, dz] = m.wd;
+        let (xx, yy, zz) = (x * x, y * y, z * z);
+        let (xy, xz, yz) = (x * y, x * z, y * z);
+        Self {
+            m: *m,
+            b: [
+                [-(yy + zz), xy - dz, xz + dy],
+                [xy + dz, -(xx + zz), yz - dx],
+                [xz - dy, yz + dx, -(xx + yy)],
+            ],
+            xy,
+            xz,
+            yz,
+            x_y: xx - yy,
+            z_x: zz - xx,
+            y_z: yy - zz,
+        }
+    }
+
+    /// For a link that turns about z only.
+    #[inline(always)]
+    pub(crate) fn planar(m: &LinkMotion<T>) -> Self {
+        let o = T::splat(0.0);
+        let zz = m.w[2] * m.w[2];
+        let dz = m.wd[2];
+        Self {
+            m: *m,
+            b: [[-zz, -dz, o], [dz, -zz, o], [o, o, o]],
+            xy: o,
+            xz: o,
+            yz: o,
+            x_y: o,
+            z_x: zz,
+            y_z: -zz,
+        }
+    }
+
+    /// Acceleration of a point fixed in the link.
+    #[inline(always)]
+    pub(crate) fn acceleration_at(&self, p: [f64; 3]) -> V3<T> {
+        let mut a = self.m.a;
+        for (c, &p) in p.iter().enumerate() {
+            if p != 0.0 {
+                for k in 0..3 {
+                    a[k] = self.b[k][c].mul_add(T::splat(p), a[k]);
+                }
+            }
+        }
+        a
+    }
+
+    /// Motion of the frame at this pose in the link's joint frame, in its own axes.
+    #[inline(always)]
+    pub(crate) fn motion_at(
+        &self,
+        rotation: &[[f64; 3]; 3],
+        translation: [f64; 3],
+    ) -> LinkMotion<T> {
+        LinkMotion {
+            w: inner(rotation, self.m.w),
+            wd: inner(rotation, self.m.wd),
+            a: inner(rotation, self.acceleration_at(translation)),
+        }
+    }
+
+    /// Entry `k < 6` of an axis's row.
+    #[inline(always)]
+    pub(crate) fn tensor_entry(&self, k: usize, [x, y, z]: V3<T>) -> T {
+        let b = &self.b;
+        match k {
+            0 => x.mul_add(self.m.wd[0], y.mul_add(self.xz, -(z * self.xy))),
+            1 => z.mul_add(self.x_y, y.mul_add(b[2][1], -(x * b[2][0]))),
+            2 => y.mul_add(self.z_x, x.mul_add(b[1][0], -(z * b[1][2]))),
+            3 => y.mul_add(self.m.wd[1], z.mul_add(self.xy, -(x * self.yz))),
+            4 => x.mul_add(self.y_z, z.mul_add(b[0][2], -(y * b[0][1]))),
+            _ => z.mul_add(self.m.wd[2], x.mul_add(self.yz, -(y * self.xz))),
+        }
+    }
+
+    /// The same for an axis without part along z.
+    #[inline(always)]
+    pub(crate) fn tensor_entry_across(&self, k: usize, [x, y, _]: V3<T>) -> T {
+        let b = &self.b;
+        match k {
+            0 => x.mul_add(self.m.wd[0], y * self.xz),
+            1 => y.mul_add(b[2][1], -(x * b[2][0])),
+            2 => y.mul_add(self.z_x, x * b[1][0]),
+            3 => y.mul_add(self.m.wd[1], -(x * self.yz)),
+            4 => x.mul_add(self.y_z, -(y * b[0][1])),
+            _ => x.mul_add(self.yz, -(y * self.xz)),
+        }
+    }
+
+    /// The same for the axis z.
+    #[inline(always)]
+    pub(crate) fn tensor_entry_about_z(&self, k: usize) -> T {
+        match k {
+            0 => -self.xy,
+            1 => self.x_y,
+            2 => -self.b[1][2],
+            3 => self.xy,
+            4 => self.b[0][2],
+            _ => self.m.wd[2],
+        }
+    }
+
+    /// Entry `k >= 6` of a slide along `f`.
+    #[inline(always)]
+    pub(crate) fn force_entry(&self, k: usize, f: V3<T>) -> T {
+        match k {
+            6..9 => {
+                let c = k - 6;
+                let b = &self.b;
+                f[0].mul_add(b[0][c], f[1].mul_add(b[1][c], f[2] * b[2][c]))
+            }
+            _ => dot(f, self.m.a),
+        }
+    }
+
+    /// Entry `k >= 6` of a revolute axis.
+    #[inline(always)]
+    pub(crate) fn moment_entry(&self, k: usize, [x, y, z]: V3<T>, f: V3<T>) -> T {
+        let [ax, ay, az] = self.m.a;
+        let force = self.force_entry(k, f);
+        match k {
+            6 => z.mul_add(ay, (-y).mul_add(az, force)),
+            7 => x.mul_add(az, (-z).mul_add(ax, force)),
+            8 => y.mul_add(ax, (-x).mul_add(ay, force)),
+            _ => force,
+        }
+    }
+
+    /// The same for an axis without part along z.
+    #[inline(always)]
+    pub(crate) fn moment_entry_across(&self, k: usize, [x, y, _]: V3<T>, f: V3<T>) -> T {
+        let [ax, ay, az] = self.m.a;
+        let force = self.force_entry(k, f);
+        match k {
+            6 => (-y).mul_add(az, force),
+            7 => x.mul_add(az, force),
+            8 => y.mul_add(ax, (-x).mul_add(ay, force)),
+            _ => force,
+        }
+    }
+
+    /// The same for an axis parallel to z, whose linear part has none along z.
+    #[inline(always)]
+    pub(crate) fn moment_entry_parallel(&self, k: usize, f: V3<T>) -> T {
+        let [ax, ay, _] = self.m.a;
+        let b = &self.b;
+        match k {
+            6 => f[0].mul_add(b[0][0], f[1].mul_add(b[1][0], ay)),
+            7 => f[0].mul_add(b[0][1], f[1].mul_add(b[1][1], -ax)),
+            8 => f[0].mul_add(b[0][2], f[1] * b[1][2]),
+            _ => f[0].mul_add(ax, f[1] * ay),
+        }
+    }
+
+    /// The same for the link's own axis; the last two are zero.
+    #[inline(always)]
+    pub(crate) fn moment_entry_about_z(&self, k: usize) -> T {
+        match k {
+            6 => self.m.a[1],
+            7 => -self.m.a[0],
+            _ => T::splat(0.0),
+        }
+    }
+}
+
+impl<T: Lane> Screw<T> {
+    /// This motion at a frame that moves with the link.
+    #[inline(always)]
+    pub(crate) fn at(&self, rotation: &[[f64; 3]; 3], translation: [f64; 3]) -> Self {
+        Self {
+            angular: inner(rotation, self.angular),
+            linear: inner(rotation, shift(translation, self.linear, self.angular)),
+        }
+    }
+}
