@@ -14,7 +14,7 @@ pub use write::robot_to_ron;
 use crate::error::Error;
 use crate::pose::Pose;
 use crate::robot::{Joint, JointKind, Link, Robot};
-use assembly::{DescribedJoint, assemble};
+use assembly::{DescribedJoint, MAX_JOINTS, assemble};
 use format::{Entry, File, Joints, Kind};
 use frames::{Frame, Reader};
 use nalgebra::Vector3;
@@ -73,6 +73,11 @@ fn describe<F: Frame>(
     base: &Pose,
     reader: &mut Reader,
 ) -> Result<Vec<DescribedJoint>, Error> {
+    if entries.len() > MAX_JOINTS {
+        let met = format!("{} joints", entries.len());
+        let rule = format!("no arm has more than {MAX_JOINTS}; is this one robot?");
+        return Err(Error::robot("joints", met, rule).at(1, 1));
+    }
     let mut described: Vec<DescribedJoint> = Vec::with_capacity(entries.len());
     let mut places = refusal::Places::new(text);
     for (i, entry) in entries.iter().enumerate() {

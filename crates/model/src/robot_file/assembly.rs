@@ -6,6 +6,9 @@ use crate::parameter::InertialParameters;
 use crate::robot::{Joint, Link, Robot};
 use nalgebra::Vector3;
 
+/// Most joints of one robot: the work on a tree of joints grows with the square.
+pub(crate) const MAX_JOINTS: usize = 1000;
+
 /// A joint as a file describes it, with its place in the text; parents stand before children.
 pub(crate) struct DescribedJoint {
     /// The joint; its parent is an index into the described list.

@@ -129,7 +129,7 @@ mod tests {
         assert_eq!(snapping.length("joint a", 1e-17), 0.0);
         assert_eq!(snapping.length("joint a", -2e-10), 0.0);
         assert_eq!(snapping.length("joint a", 1e-6), 1e-6);
-        let axis = snapping.axis("joint b", Vector3::new(4.9e-12, 0.0, -2.0));
+        let axis = snapping.axis("joint b", Vector3::new(5e-12, 0.0, -2.0));
         assert_eq!(axis, Vector3::new(0.0, 0.0, -1.0));
         let notes = snapping.into_notes();
         assert_eq!(notes.len(), 3);

@@ -12,9 +12,6 @@ use ron::ser::PrettyConfig;
 ///
 /// `robot_from_ron(&robot_to_ron(&robot))` is the same robot to rounding: rotations pass through roll, pitch and yaw.
 /// Inertial values are written about the origin of the link's frame; [`Robot::notes`] are not written.
-///
-/// # Panics
-/// Never: every robot has a text.
 pub fn robot_to_ron(robot: &Robot) -> String {
     let entries = robot
         .joints()

@@ -5,13 +5,11 @@ use crate::error::Error;
 use crate::parameter::InertialParameters;
 use crate::pose::Pose;
 use crate::robot::{Actuator, JointLimits};
+use crate::robot_file::assembly::MAX_JOINTS;
 use crate::robot_file::snapping::Snapping;
 use crate::suggestion::did_you_mean;
 use nalgebra::{Matrix3, Vector3};
 use roxmltree::Node;
-
-/// Most joints of one robot: the work on a tree of joints grows with the square.
-const MAX_JOINTS: usize = 1000;
 
 pub(super) struct UrdfLink {
     pub(super) name: String,
