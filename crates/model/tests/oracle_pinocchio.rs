@@ -125,7 +125,9 @@ fn oracle_pinocchio_agrees_on_random_trees() {
         .filter(|o| o["name"].as_str().unwrap().starts_with("tree"))
         .collect();
     assert!(trees.len() >= 30);
-    trees.iter().for_each(|tree| check(tree));
+    for tree in &trees {
+        check(tree);
+    }
 }
 
 #[test]
@@ -135,5 +137,7 @@ fn oracle_pinocchio_agrees_on_known_robots() {
         .filter(|o| !o["name"].as_str().unwrap().starts_with("tree"))
         .collect();
     assert_eq!(known.len(), 6);
-    known.iter().for_each(|robot| check(robot));
+    for robot in &known {
+        check(robot);
+    }
 }

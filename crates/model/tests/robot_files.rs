@@ -43,6 +43,23 @@ fn assert_same_regressor(a: &Robot, b: &Robot) {
     }
 }
 
+/// The complete file of the format's description.
+#[test]
+fn identity_the_documented_file_is_read() {
+    let page = include_str!("../../../docs/robot-file.md");
+    let text = page
+        .split("```ron\n")
+        .nth(1)
+        .unwrap()
+        .split("```")
+        .next()
+        .unwrap();
+    let robot = robot_from_ron(text).unwrap();
+    assert_eq!(robot.n_joints(), 2);
+    assert_eq!(robot.links()[1].name, "forearm");
+    assert_eq!(robot.notes(), [""; 0]);
+}
+
 #[test]
 fn identity_every_robot_survives_writing_and_reading() {
     for text in ALL {
