@@ -1,9 +1,10 @@
 //! What can be wrong with a log, and where.
 
+use serde::Serialize;
 use std::fmt;
 
 /// Where something stands in a log; only what is known is filled in.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Place {
     /// Name of the file.
     pub file: String,

@@ -25,6 +25,24 @@ pub(crate) struct Layout {
     pub(crate) notes: Vec<String>,
 }
 
+impl Layout {
+    /// Every needed column in the order of the log: time, positions, velocities, accelerations, drive.
+    pub(crate) fn sources(&self) -> Vec<(Quantity, Source)> {
+        let mut sources: Vec<(Quantity, Source)> = Vec::new();
+        sources.extend(self.time.map(|s| (Quantity::Time, s)));
+        let groups = [
+            (Quantity::Position, Some(&self.position)),
+            (Quantity::Velocity, self.velocity.as_ref()),
+            (Quantity::Acceleration, self.acceleration.as_ref()),
+            (self.drive.0, Some(&self.drive.1)),
+        ];
+        for (quantity, group) in groups {
+            sources.extend(group.into_iter().flatten().map(|&s| (quantity, s)));
+        }
+        sources
+    }
+}
+
 /// Finds the columns the robot needs, or says what is missing, doubled or in an unknown unit.
 pub(crate) fn find_layout(
     headers: &[String],

@@ -32,10 +32,13 @@
 //! It does not decide how a log is filtered: the caller does, and every choice is recorded ([`Choice`]).
 
 mod clock;
+mod columns;
 mod conditioning;
+mod csv_log;
 mod decimate;
 mod dialect;
 mod differentiate;
+pub mod doctor;
 mod error;
 mod filter;
 mod finder;
@@ -50,16 +53,18 @@ mod plausibility;
 mod quantity;
 
 pub use clock::{Clock, GAP, Gap, interpolate, read_clock, uniform_grid, uniform_interval};
+pub use columns::{NamedColumn, log_from_columns};
 pub use conditioning::{
     Choice, Conditioned, ConditioningOptions, Derivatives, LowPass, Segment, condition,
 };
+pub use csv_log::read_csv;
 pub use decimate::Decimator;
 pub use differentiate::{first_difference, second_difference};
 pub use error::{Error, Place};
 pub use filter::{Section, butterworth, chebyshev, filter_zero_phase, padding, settling};
 pub use harmonics::{Harmonics, fit_harmonics};
 pub use header::{ColumnMapping, JointLabel, MappedColumn, joint_labels};
-pub use log::{Drive, Log, read_csv};
+pub use log::{Drive, Log};
 pub use measurements::Measurements;
 pub use motion::{JointMotion, check_motion, joint_motion};
 pub use period::{Period, PeriodAverage, REPEATS, average_periods, find_period};

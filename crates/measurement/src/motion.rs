@@ -25,21 +25,25 @@ const STILL_LENGTH: f64 = 0.002;
 /// Span over which a speed is measured, s: long against noise.
 const SPAN: f64 = 0.1;
 
+/// Range below which a joint stands still, rad (m).
+pub(crate) fn still(kind: JointKind) -> f64 {
+    match kind {
+        JointKind::Revolute => STILL_ANGLE,
+        JointKind::Prismatic => STILL_LENGTH,
+    }
+}
+
 /// Range and speed of every joint.
 pub fn joint_motion(measured: &Measurements, robot: &Robot) -> Vec<JointMotion> {
     let joints = robot.joints().iter().zip(&measured.q);
     joints
         .map(|(joint, q)| {
             let (low, high) = range(q);
-            let still = match joint.kind {
-                JointKind::Revolute => STILL_ANGLE,
-                JointKind::Prismatic => STILL_LENGTH,
-            };
             JointMotion {
                 joint: joint.name.clone(),
                 range: high - low,
                 speed: largest_speed(&measured.time, q),
-                moved: high - low > still,
+                moved: high - low > still(joint.kind),
             }
         })
         .collect()

@@ -17,13 +17,13 @@ pub fn check_log(log: &Log, robot: &Robot) -> Result<Vec<String>, Error> {
     Ok(warnings)
 }
 
-/// Sampling intervals (s) a recorded motion can have: 50 kHz to 2 Hz.
-const PLAUSIBLE_INTERVAL: [f64; 2] = [2e-5, 0.5];
+/// Sampling intervals (s) a recorded motion can have: 50 kHz to 10 Hz.
+const PLAUSIBLE_INTERVAL: [f64; 2] = [2e-5, 0.1];
 
 /// Refuses a clock whose unit is not declared and whose interval cannot be seconds.
 ///
 /// # Errors
-/// A median interval outside 20 µs to 0.5 s, with the unit that would fit.
+/// A median interval outside 20 µs to 0.1 s, with the unit that would fit.
 pub fn check_clock_unit(log: &Log) -> Result<(), Error> {
     let dt = median_interval(&log.time);
     let [low, high] = PLAUSIBLE_INTERVAL;
@@ -107,7 +107,7 @@ pub fn velocity_fit(time: &[f64], q: &[f64], qd: &[f64]) -> Option<VelocityFit> 
 }
 
 /// Correlation above which a factor is meant: two records of one motion.
-const SAME_MOTION: f64 = 0.9;
+pub(crate) const SAME_MOTION: f64 = 0.9;
 /// Deviation of a factor from a suspected one, relative.
 const FACTOR_TOLERANCE: f64 = 0.05;
 
@@ -210,44 +210,70 @@ const DOUBTFUL: f64 = 2.0;
 /// Range of a revolute joint without limits, in turns, that is doubtful.
 const DOUBTFUL_TURNS: f64 = 1.2;
 
+/// A joint whose positions can hardly be what they claim.
+pub(crate) struct PositionDoubt {
+    pub(crate) joint: String,
+    /// Widest reach over what is allowed.
+    pub(crate) times: f64,
+    pub(crate) met: String,
+    pub(crate) rule: String,
+    /// It cannot be.
+    pub(crate) impossible: bool,
+}
+
+pub(crate) fn position_doubts(log: &Log, robot: &Robot) -> Vec<PositionDoubt> {
+    let mut doubts = Vec::new();
+    for (j, joint) in robot.joints().iter().enumerate() {
+        let (low, high) = range(&log.q[j]);
+        let met = format!("q from {low:.4} to {high:.4}");
+        let (unit, revolute) = match joint.kind {
+            JointKind::Revolute => ("degrees (then name it `q1_deg`)", true),
+            JointKind::Prismatic => ("mm (then name it `q1_mm`)", false),
+        };
+        let (times, rule) = if let Some(limits) = joint.limits.position {
+            let reach = low.abs().max(high.abs());
+            let largest = limits[0].abs().max(limits[1].abs());
+            let times = (reach / largest).min((high - low).max(reach) / (limits[1] - limits[0]));
+            let [a, b] = limits;
+            (
+                times,
+                format!(
+                    "the robot's limits are {a} to {b}; is it in {unit} or on the motor side of a gear?"
+                ),
+            )
+        } else if revolute {
+            // Scaled so that 1.2 turns are as doubtful as twice the limits; never impossible.
+            let turns = (high - low) / std::f64::consts::TAU;
+            let times = (turns * DOUBTFUL / DOUBTFUL_TURNS).min(BEYOND_LIMITS);
+            (times, format!("that is {turns:.1} turns; is it in {unit}?"))
+        } else {
+            continue;
+        };
+        if times > DOUBTFUL {
+            doubts.push(PositionDoubt {
+                joint: joint.name.clone(),
+                times,
+                met,
+                rule,
+                impossible: times > BEYOND_LIMITS,
+            });
+        }
+    }
+    doubts
+}
+
 /// Positions against the robot's limits, or against a turn where it states none.
 ///
 /// # Errors
 /// A joint with limits that reaches four times as far: degrees, or the motor side of a gear.
 pub fn check_positions(log: &Log, robot: &Robot) -> Result<Vec<String>, Error> {
     let mut warnings = Vec::new();
-    for (j, joint) in robot.joints().iter().enumerate() {
-        let (low, high) = range(&log.q[j]);
-        let Some(limits) = joint.limits.position else {
-            let turn = 2.0 * std::f64::consts::PI;
-            if joint.kind == JointKind::Revolute && high - low > DOUBTFUL_TURNS * turn {
-                warnings.push(format!(
-                    "{}, joint {}: q ranges over {:.3} rad, more than {DOUBTFUL_TURNS} turns; if it is in degrees, name it `q1_deg`",
-                    log.file, joint.name, high - low
-                ));
-            }
-            continue;
-        };
-        let reach = low.abs().max(high.abs());
-        let largest = limits[0].abs().max(limits[1].abs());
-        let times = (reach / largest).min((high - low).max(reach) / (limits[1] - limits[0]));
-        let unit = if joint.kind == JointKind::Revolute {
-            "degrees (then name it `q1_deg`)"
-        } else {
-            "mm (then name it `q1_mm`)"
-        };
-        let met = format!("q from {low:.4} to {high:.4}");
-        let rule = format!(
-            "the robot's limits are {} to {}; is it in {unit} or on the motor side of a gear?",
-            limits[0], limits[1]
-        );
-        if times > BEYOND_LIMITS {
-            let place = Place::file(&log.file).joint(&joint.name);
-            return Err(Error::log("position-range", place, met, rule));
+    for doubt in position_doubts(log, robot) {
+        let place = Place::file(&log.file).joint(&doubt.joint);
+        if doubt.impossible {
+            return Err(Error::log("position-range", place, doubt.met, doubt.rule));
         }
-        if times > DOUBTFUL {
-            warnings.push(format!("{}, joint {}: {met}; {rule}", log.file, joint.name));
-        }
+        warnings.push(format!("{place}: {}; {}", doubt.met, doubt.rule));
     }
     Ok(warnings)
 }

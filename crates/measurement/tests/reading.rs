@@ -105,7 +105,11 @@ fn repeated_lines_are_left_out_and_counted() {
     let repeated: Vec<&str> = text.lines().flat_map(|l| [l, l]).skip(1).collect();
     let log = read(&repeated.join("\n")).unwrap();
     assert_eq!(log.n_samples(), 20);
-    assert!(log.notes.iter().any(|n| n == "20 repeated lines left out"));
+    assert!(
+        log.notes
+            .iter()
+            .any(|n| n == "20 repeated samples left out")
+    );
 }
 
 #[test]
