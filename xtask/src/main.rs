@@ -1,2 +1,44 @@
-//! Placeholder.
-fn main() {}
+//! Driver of the workspace: `cargo xtask identify`, `cargo xtask reduce`, `cargo xtask tidy`.
+
+use clap::{Parser, Subcommand};
+use std::path::Path;
+use std::process::ExitCode;
+use xtask::tidy::{CHECKS, Tree};
+
+/// Driver of the idim workspace.
+#[derive(Debug, Parser)]
+#[command(name = "xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Debug, Subcommand)]
+enum Task {
+    /// What the binary does: identify, reduce.
+    #[command(flatten)]
+    Idim(idim::cli::Command),
+    /// Check the rules of the house that a machine can check.
+    Tidy,
+}
+
+fn main() -> ExitCode {
+    match Arguments::parse().task {
+        Task::Idim(command) => idim::cli::main(&command),
+        Task::Tidy => tidy(),
+    }
+}
+
+fn tidy() -> ExitCode {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let tree = Tree::read(&root);
+    let findings: Vec<String> = CHECKS.iter().flat_map(|(_, check)| check(&tree)).collect();
+    for finding in &findings {
+        eprintln!("{finding}");
+    }
+    if findings.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}

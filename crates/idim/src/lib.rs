@@ -1,3 +1,32 @@
-//! Placeholder.
+//! From a robot and its logs to a dynamic model with proof of how good it is.
+//!
+//! The pipeline (`identify`), the reproductions of two papers (`puma`, `crs_a460`), the command line and the report.
 
+pub mod cli;
+pub mod crs_a460;
+mod design;
+mod error;
+mod identify;
+mod load;
+mod logs;
+mod noise_study;
+mod output;
+mod papers;
 pub mod plot;
+mod plots;
+mod progress;
+pub mod puma;
+pub mod report;
+mod result;
+mod samples;
+pub mod simulate;
+mod structure;
+mod table;
+
+pub use error::Error;
+pub use identify::{Identification, IdentifyOptions, Prediction, TRAINING_SHARE, identify};
+pub use load::{Changes, LoadedRobot, load_robot};
+pub use output::write_atomically;
+pub use progress::Progress;
+pub use result::*;
+pub use structure::{KeepOrder, Structure};

@@ -1,0 +1,313 @@
+//! The command line, shared by the binary and the workspace's driver.
+
+use crate::error::Error;
+use crate::identify::{IdentifyOptions, identify};
+use crate::load::{Changes, LoadedRobot, load_robot};
+use crate::logs::read_logs;
+use crate::output::write_atomically;
+use crate::progress::Progress;
+use crate::report::{identification_text, paper_text, reduction_text, warnings_text};
+use crate::result::IdentificationResult;
+use crate::structure::{KeepOrder, Structure};
+use crate::{crs_a460, plots, puma};
+use clap::{Args, Subcommand, ValueEnum};
+use idim_model::DriveColumns;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// What idim can be asked.
+#[derive(Debug, Clone, Subcommand)]
+pub enum Command {
+    /// Identify a robot from its logs, or reproduce the papers.
+    Identify(IdentifyArgs),
+    /// Show which parameters of a robot the motors can feel at all.
+    Reduce(ReduceArgs),
+}
+
+/// A paper idim reproduces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Paper {
+    /// Gautier & Khalil 1991.
+    Puma,
+    /// Radkhah, Kulić & Croft 2007.
+    CrsA460,
+}
+
+/// A column beside the inertial ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Column {
+    /// Viscous friction.
+    Viscous,
+    /// Coulomb friction.
+    Coulomb,
+    /// Constant torque.
+    Offset,
+    /// Rotor inertia.
+    Rotor,
+}
+
+/// How a robot is mounted and held.
+#[derive(Debug, Clone, Args)]
+pub struct RobotChanges {
+    /// Gravity in the base frame, m/s², as X,Y,Z (default: as in the file, 0,0,-9.81 for URDF).
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_gravity, allow_hyphen_values = true)]
+    pub gravity: Option<[f64; 3]>,
+    /// Hold a joint at a position (rad or m, default 0); may be repeated.
+    #[arg(long, value_name = "JOINT[=VALUE]", value_parser = parse_lock)]
+    pub lock: Vec<(String, f64)>,
+}
+
+/// Arguments of `identify`.
+#[derive(Debug, Clone, Args)]
+pub struct IdentifyArgs {
+    /// The paper to reproduce; both in turn when neither a paper nor a robot is given.
+    #[arg(conflicts_with_all = ["robot", "log"])]
+    pub paper: Option<Paper>,
+    /// Robot file, .ron or .urdf.
+    #[arg(long, value_name = "FILE", requires = "log")]
+    pub robot: Option<PathBuf>,
+    /// Log to learn from; may be repeated or list several files.
+    #[arg(long, value_name = "FILE", num_args = 1.., requires = "robot")]
+    pub log: Vec<PathBuf>,
+    /// Log to validate on (default: the last 30 % of each log).
+    #[arg(long, value_name = "FILE", num_args = 1.., requires = "log")]
+    pub validate: Vec<PathBuf>,
+    /// Folder for results: DIR/ROBOT/result.json and plots.
+    #[arg(long, value_name = "DIR", default_value = "idim-out")]
+    pub out: PathBuf,
+    /// Seed of everything random.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Changes to the robot.
+    #[command(flatten)]
+    pub changes: RobotChanges,
+    /// Columns beside the inertial ones (default: all four).
+    #[arg(long, value_delimiter = ',', num_args = 0.., value_name = "COLUMN")]
+    pub columns: Option<Vec<Column>>,
+    /// Take q, qd, qdd and torque as they are: no filter, no differentiation, no decimation.
+    #[arg(long)]
+    pub as_recorded: bool,
+}
+
+/// Arguments of `reduce`.
+#[derive(Debug, Clone, Args)]
+pub struct ReduceArgs {
+    /// Robot file, .ron or .urdf.
+    #[arg(long, value_name = "FILE")]
+    pub robot: PathBuf,
+    /// Print the `reduction` object of idim-result/1.
+    #[arg(long)]
+    pub json: bool,
+    /// Keep columns in the order m mx my mz Ixx.. (names of the CRS A460 paper) instead of XX .. MX .. M.
+    #[arg(long)]
+    pub mass_first: bool,
+    /// Changes to the robot.
+    #[command(flatten)]
+    pub changes: RobotChanges,
+}
+
+/// Does what was asked; what a person reads goes to `out`.
+///
+/// # Errors
+/// Bad input, with place, value, rule and next step; then nothing is written.
+pub fn run(command: &Command, out: &mut dyn Write) -> Result<(), Error> {
+    match command {
+        Command::Identify(args) => run_identify(args, out),
+        Command::Reduce(args) => run_reduce(args, out),
+    }
+}
+
+fn run_identify(args: &IdentifyArgs, out: &mut dyn Write) -> Result<(), Error> {
+    if let Some(robot) = &args.robot {
+        return run_logs(args, robot, out);
+    }
+    let papers = args
+        .paper
+        .map_or_else(|| vec![Paper::Puma, Paper::CrsA460], |p| vec![p]);
+    for paper in papers {
+        let progress = Progress::new();
+        let (text, result, plots) = match paper {
+            Paper::Puma => {
+                let run = puma::run(args.seed, &progress)?;
+                let plots = run.plots();
+                (run.text, run.result, plots)
+            }
+            Paper::CrsA460 => {
+                let run = crs_a460::run(args.seed, &progress)?;
+                let plots = run.plots();
+                (run.text, run.result, plots)
+            }
+        };
+        progress.finish();
+        let numbers = format!("\nBeside the paper\n{}", paper_text(&result.paper));
+        say(out, &(text + &numbers + &warnings_text(&result.warnings)))?;
+        write_results(&args.out, &result, &plots, out)?;
+    }
+    Ok(())
+}
+
+fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<(), Error> {
+    let progress = Progress::new();
+    progress.stage("reading");
+    let loaded = load(robot, &args.changes)?;
+    if let Some(twice) = args.log.iter().find(|l| args.validate.contains(l)) {
+        return Err(Error::input(
+            twice.display().to_string(),
+            "given both as --log and as --validate",
+            "a model is proved on motions it has not seen; give another file",
+        ));
+    }
+    let training = read_logs(&args.log, &loaded)?;
+    let validation = read_logs(&args.validate, &loaded)?;
+    let options = IdentifyOptions {
+        columns: drive_columns(args.columns.as_deref()),
+        as_recorded: args.as_recorded,
+        seed: args.seed,
+    };
+    progress.stage("identifying");
+    let mut notes = training.notes;
+    notes.extend(validation.notes);
+    let mut identification = identify(
+        &loaded,
+        training.measurements,
+        validation.measurements,
+        &options,
+    )?;
+    identification.result.warnings.extend(notes);
+    progress.stage("drawing");
+    let plots = plots::of_identification(&identification, &loaded.robot);
+    progress.finish();
+    say(out, &identification_text(&identification))?;
+    write_results(&args.out, &identification.result, &plots, out)
+}
+
+fn run_reduce(args: &ReduceArgs, out: &mut dyn Write) -> Result<(), Error> {
+    let loaded = load(&args.robot, &args.changes)?;
+    let order = if args.mass_first {
+        KeepOrder::MassFirst
+    } else {
+        KeepOrder::Links
+    };
+    let structure = Structure::of_torque(&loaded.robot, DriveColumns::NONE, order);
+    let reduction = structure.to_result();
+    if args.json {
+        let json = serde_json::to_string_pretty(&reduction)
+            .map_err(|e| Error::input("reduction", e.to_string(), "a defect of this program"))?;
+        say(out, &(json + "\n"))?;
+    } else {
+        let text = reduction_text(loaded.robot.name(), &reduction);
+        say(out, &(text + &warnings_text(loaded.robot.notes())))?;
+    }
+    structure.decided().map(|_| ())
+}
+
+fn load(robot: &Path, changes: &RobotChanges) -> Result<LoadedRobot, Error> {
+    load_robot(
+        robot,
+        &Changes {
+            gravity: changes.gravity,
+            lock: changes.lock.clone(),
+        },
+    )
+}
+
+/// One file, name and contents.
+pub type NamedText = (String, String);
+
+/// Writes `DIR/ROBOT/result.json` and the plots, and says where.
+fn write_results(
+    dir: &Path,
+    result: &IdentificationResult,
+    plots: &[NamedText],
+    out: &mut dyn Write,
+) -> Result<(), Error> {
+    let folder = dir.join(file_name(&result.robot));
+    let json = serde_json::to_string_pretty(result)
+        .map_err(|e| Error::input("result", e.to_string(), "a defect of this program"))?;
+    for (name, text) in plots {
+        write_atomically(&folder.join(name), text.as_bytes())?;
+    }
+    write_atomically(&folder.join("result.json"), json.as_bytes())?;
+    say(
+        out,
+        &format!(
+            "\nwrote {} and {} plots beside it\n\n",
+            folder.join("result.json").display(),
+            plots.len()
+        ),
+    )
+}
+
+/// A robot's or joint's name as a name for a file: nothing in it can leave the folder.
+pub(crate) fn file_name(name: &str) -> String {
+    let plain: String = name
+        .chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() || "-_".contains(c) {
+                c.to_ascii_lowercase()
+            } else {
+                '-'
+            }
+        })
+        .collect();
+    let plain = plain.trim_matches('-');
+    if plain.is_empty() {
+        "robot".into()
+    } else {
+        plain.into()
+    }
+}
+
+fn say(out: &mut dyn Write, text: &str) -> Result<(), Error> {
+    out.write_all(text.as_bytes())
+        .map_err(|source| Error::Write {
+            path: "standard output".into(),
+            source,
+        })
+}
+
+fn drive_columns(chosen: Option<&[Column]>) -> DriveColumns {
+    let Some(chosen) = chosen else {
+        return DriveColumns::ALL;
+    };
+    DriveColumns {
+        rotor: chosen.contains(&Column::Rotor),
+        viscous: chosen.contains(&Column::Viscous),
+        coulomb: chosen.contains(&Column::Coulomb),
+        offset: chosen.contains(&Column::Offset),
+    }
+}
+
+fn parse_gravity(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|t| t.trim().parse::<f64>()).collect();
+    let [x, y, z] = numbers
+        .ok()
+        .and_then(|n| <[f64; 3]>::try_from(n).ok())
+        .ok_or("three numbers in m/s², for example 0,0,-9.81")?;
+    Ok([x, y, z])
+}
+
+fn parse_lock(text: &str) -> Result<(String, f64), String> {
+    let Some((name, value)) = text.split_once('=') else {
+        return Ok((text.to_owned(), 0.0));
+    };
+    let value: f64 = value
+        .parse()
+        .map_err(|_| format!("`{value}` is not a number; write JOINT=VALUE in rad or m"))?;
+    if !value.is_finite() {
+        return Err(format!("`{value}` is not finite"));
+    }
+    Ok((name.to_owned(), value))
+}
+
+/// Runs a command for a process: text to standard output, an error to standard error, an exit code.
+pub fn main(command: &Command) -> ExitCode {
+    match run(command, &mut std::io::stdout().lock()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,34 @@
+//! Motions designed by the pipeline.
+
+use crate::error::Error;
+use idim_excitation::{Criterion, FourierOptions, Scaling, optimise_fourier};
+use idim_model::{Columns, Model, Robot};
+use idim_trajectory::{FourierSeries, Limits};
+
+/// Period of a designed motion, s, that of the CRS A460's experiments.
+const PERIOD: f64 = 10.0;
+/// Harmonics of a designed motion, as there.
+const HARMONICS: usize = 5;
+
+/// A motion of small raw condition number, certified within the limits.
+///
+/// # Errors
+/// Limits that leave no room.
+pub(crate) fn motion_for(
+    robot: &Robot,
+    columns: &Columns,
+    limits: &Limits,
+    seed: u64,
+) -> Result<FourierSeries, Error> {
+    let options = FourierOptions {
+        period: PERIOD,
+        n_harmonics: HARMONICS,
+        n_samples: 100,
+        criterion: Criterion::TwoNorm(Scaling::Raw),
+        n_starts: 4,
+        seed,
+        max_evaluations: 400,
+        n_constraint_samples: 48,
+    };
+    Ok(optimise_fourier(&Model::new(robot), columns, limits, &options)?.series)
+}

@@ -1,0 +1,80 @@
+//! What stops a run.
+
+use std::path::PathBuf;
+
+/// A run that cannot go on, with what to do next.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file cannot be read.
+    #[error("{}: {source}; check the path and its permissions", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file cannot be written; nothing is left half-written.
+    #[error("{}: cannot be written: {source}; choose another --out", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The robot file.
+    #[error("{}: {source}", path.display())]
+    Robot {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: idim_model::Error,
+    },
+    /// A robot described in the program's own terms.
+    #[error(transparent)]
+    Model(#[from] idim_model::Error),
+    /// A log.
+    #[error(transparent)]
+    Measurement(#[from] idim_measurement::Error),
+    /// The estimate.
+    #[error(transparent)]
+    Estimation(#[from] idim_estimation::Error),
+    /// The trajectory.
+    #[error(transparent)]
+    Trajectory(#[from] idim_trajectory::Error),
+    /// The excitation.
+    #[error(transparent)]
+    Excitation(#[from] idim_excitation::Error),
+    /// A rank without a clear gap.
+    #[error(
+        "{message}; if an angle of the robot file was rounded, write it exactly, else hold the joint in doubt with --lock"
+    )]
+    AmbiguousRank {
+        /// Which ranks, and which combination is in doubt.
+        message: String,
+    },
+    /// A rule of the command line or of a file that only this crate knows.
+    #[error("{place}: {met}; {rule}")]
+    Input {
+        /// Where.
+        place: String,
+        /// What was met.
+        met: String,
+        /// The rule and the next step.
+        rule: String,
+    },
+}
+
+impl Error {
+    pub(crate) fn input(
+        place: impl Into<String>,
+        met: impl Into<String>,
+        rule: impl Into<String>,
+    ) -> Self {
+        Self::Input {
+            place: place.into(),
+            met: met.into(),
+            rule: rule.into(),
+        }
+    }
+}

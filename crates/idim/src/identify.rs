@@ -1,0 +1,279 @@
+//! The way of the data: logs to rows, rows to an estimate, the estimate to errors on motions it has not seen.
+
+use crate::error::Error;
+use crate::load::LoadedRobot;
+use crate::result::{
+    ConditionResult, ErrorResult, EstimateResult, IdentificationResult, JointError,
+    ParameterResult, SCHEMA,
+};
+use crate::samples::{Rows, SamplingPlan, Stretch, predict, push_rows, stretches};
+use crate::structure::{KeepOrder, Structure};
+use faer::MatRef;
+use idim_base_params::{ReductionOptions, TriangularFactor, reduce};
+use idim_estimation::{
+    ResidualStatistics, WeightedEstimate, WeightedSolution, Weighting, WeightingOptions,
+    weighted_least_squares_dense,
+};
+use idim_measurement::Measurements;
+use idim_model::{Columns, DriveColumns, Robot};
+
+/// What one run is asked for.
+#[derive(Debug, Clone)]
+pub struct IdentifyOptions {
+    /// Drive columns beside the inertial ones.
+    pub columns: DriveColumns,
+    /// Take q, q̇, q̈ and torque as they are.
+    pub as_recorded: bool,
+    /// Kept in the result; nothing in an identification from logs is random but the structure's draw, which is fixed.
+    pub seed: u64,
+}
+
+/// Share of each log that trains when no validation log is given; typical for one recording.
+pub const TRAINING_SHARE: f64 = 0.7;
+
+/// Measured and predicted torque of a stretch.
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    /// Whether the estimate was made from it.
+    pub training: bool,
+    /// Time on the log's clock, s.
+    pub time: Vec<f64>,
+    /// As recorded, joint by joint, N·m.
+    pub measured: Vec<Vec<f64>>,
+    /// As predicted, joint by joint, N·m.
+    pub predicted: Vec<Vec<f64>>,
+}
+
+/// Everything an identification from logs found.
+#[derive(Debug, Clone)]
+pub struct Identification {
+    /// For `result.json`.
+    pub result: IdentificationResult,
+    /// Names of the joints.
+    pub joints: Vec<String>,
+    /// Torques over time, training stretches first.
+    pub predictions: Vec<Prediction>,
+}
+
+/// Identifies a robot from its logs.
+///
+/// Without `validation` logs the first 70 % of each log train and the rest validates. Errors are those of the torque
+/// predicted from the conditioned states against the recorded torque, at the log's own rate.
+///
+/// # Errors
+/// An ambiguous structure, logs that cannot be conditioned, too few rows.
+pub fn identify(
+    loaded: &LoadedRobot,
+    training: Vec<Measurements>,
+    validation: Vec<Measurements>,
+    options: &IdentifyOptions,
+) -> Result<Identification, Error> {
+    let robot = &loaded.robot;
+    let structure = Structure::of_torque(robot, options.columns, KeepOrder::Links).decided()?;
+    let mut warnings: Vec<String> = robot.notes().to_vec();
+    for m in &training {
+        warnings.extend(idim_measurement::check_motion(m, robot)?);
+    }
+    let (training, validation) = if validation.is_empty() {
+        training.iter().map(split).unzip()
+    } else {
+        (training, validation)
+    };
+    let plan = if options.as_recorded {
+        SamplingPlan::as_recorded()
+    } else {
+        SamplingPlan::from_motion(&training)
+    };
+    let train = all_stretches(&training, &plan)?;
+    let held_out = all_stretches(&validation, &plan)?;
+    let fit = fit(robot, &structure, &train, &plan, &mut warnings)?;
+    let predictions: Vec<Prediction> = [(true, &train), (false, &held_out)]
+        .into_iter()
+        .flat_map(|(is_training, all)| all.iter().map(move |s| (is_training, s)))
+        .map(|(training, s)| Prediction {
+            training,
+            time: s.time.clone(),
+            measured: s.torque.clone(),
+            predicted: predict(robot, &fit.columns, &fit.values, s, &plan),
+        })
+        .collect();
+    let result = IdentificationResult {
+        schema: SCHEMA,
+        version: env!("CARGO_PKG_VERSION"),
+        robot: robot.name().to_owned(),
+        seed: options.seed,
+        reduction: structure.to_result(),
+        estimate: Some(fit.result),
+        train: errors(robot, &predictions, true),
+        validation: errors(robot, &predictions, false),
+        excitation: None,
+        paper: Vec::new(),
+        conditioning: plan.choices.clone(),
+        warnings,
+    };
+    Ok(Identification {
+        result,
+        joints: robot.joints().iter().map(|j| j.name.clone()).collect(),
+        predictions,
+    })
+}
+
+/// The first part trains, the rest validates; cut before anything is filtered, so that nothing leaks.
+fn split(m: &Measurements) -> (Measurements, Measurements) {
+    let n = m.n_samples();
+    let cut = (TRAINING_SHARE * n as f64).round() as usize;
+    (m.slice(0..cut), m.slice(cut..n))
+}
+
+fn all_stretches(logs: &[Measurements], plan: &SamplingPlan) -> Result<Vec<Stretch>, Error> {
+    let parts: Result<Vec<_>, _> = logs.iter().map(|m| stretches(m, plan)).collect();
+    Ok(parts?.into_iter().flatten().collect())
+}
+
+struct Fit {
+    columns: Columns,
+    values: Vec<f64>,
+    result: EstimateResult,
+}
+
+fn fit(
+    robot: &Robot,
+    structure: &Structure,
+    train: &[Stretch],
+    plan: &SamplingPlan,
+    warnings: &mut Vec<String>,
+) -> Result<Fit, Error> {
+    let columns = structure.base_columns();
+    let mut rows = Rows::default();
+    for stretch in train {
+        push_rows(&mut rows, robot, &columns, stretch, plan)?;
+    }
+    let names = structure.base_names();
+    match weighted(&rows, columns.len(), robot.n_joints())? {
+        WeightedSolution::Determined(estimate) => {
+            let result = estimate_result(
+                &estimate,
+                &names,
+                "weighted least squares, one variance a joint, iterated",
+            );
+            Ok(Fit {
+                columns,
+                values: estimate.estimate.values,
+                result,
+            })
+        }
+        WeightedSolution::RankDeficient(_) => excited_fit(robot, &columns, &names, &rows, warnings),
+    }
+}
+
+fn weighted(rows: &Rows, n_columns: usize, n_joints: usize) -> Result<WeightedSolution, Error> {
+    let w = MatRef::from_row_major_slice(&rows.w, rows.y.len(), n_columns);
+    let options = WeightingOptions {
+        weighting: Weighting::Diagonal,
+        ..WeightingOptions::default()
+    };
+    Ok(weighted_least_squares_dense(
+        w, &rows.y, n_joints, &options,
+    )?)
+}
+
+/// The log does not excite every base parameter: estimate what it does, and say what it does not.
+fn excited_fit(
+    robot: &Robot,
+    columns: &Columns,
+    names: &[String],
+    rows: &Rows,
+    warnings: &mut Vec<String>,
+) -> Result<Fit, Error> {
+    let p = columns.len();
+    let mut factor = TriangularFactor::new(p);
+    factor.push_rows(&rows.w);
+    let order: Vec<usize> = (0..p).collect();
+    let reduction = reduce(&factor, &order, &ReductionOptions::default());
+    let kept = &reduction.base;
+    let excited_names = reduction.base_names(names);
+    warnings.push(format!(
+        "this log excites only {} of {} base parameters; not determined on their own: {}. Move every joint, faster and in more directions, or hold still joints with --lock",
+        kept.len(),
+        p,
+        (0..p).filter(|k| !reduction.identifiable_alone.contains(k)).map(|k| names[k].as_str()).collect::<Vec<_>>().join(", "),
+    ));
+    let mut w = Vec::with_capacity(rows.y.len() * kept.len());
+    for row in rows.w.chunks_exact(p) {
+        w.extend(kept.iter().map(|&k| row[k]));
+    }
+    let reduced = Rows {
+        w,
+        y: rows.y.clone(),
+    };
+    let WeightedSolution::Determined(estimate) = weighted(&reduced, kept.len(), robot.n_joints())?
+    else {
+        return Err(Error::input(
+            "estimate",
+            format!(
+                "rank below {} after reduction to what the log excites",
+                kept.len()
+            ),
+            "record a motion that moves every joint",
+        ));
+    };
+    let result = estimate_result(
+        &estimate,
+        &excited_names,
+        "weighted least squares on the parameters this log excites",
+    );
+    Ok(Fit {
+        columns: columns.select(kept),
+        values: estimate.estimate.values,
+        result,
+    })
+}
+
+fn estimate_result(fit: &WeightedEstimate, names: &[String], method: &str) -> EstimateResult {
+    let e = &fit.estimate;
+    let finite = |x: f64| x.is_finite().then_some(x);
+    EstimateResult {
+        method: method.into(),
+        parameters: names
+            .iter()
+            .enumerate()
+            .map(|(k, name)| ParameterResult {
+                name: name.clone(),
+                value: Some(e.values[k]),
+                std: finite(e.standard_deviation[k]),
+                relative_std: finite(e.relative_std[k]),
+            })
+            .collect(),
+        condition_number: ConditionResult {
+            raw: Some(fit.ordinary.condition_number.raw),
+            equilibrated: Some(fit.ordinary.condition_number.equilibrated),
+            weighted: Some(e.condition_number.raw),
+        },
+    }
+}
+
+fn errors(robot: &Robot, predictions: &[Prediction], training: bool) -> Option<ErrorResult> {
+    let mut statistics = ResidualStatistics::new(robot.n_joints());
+    for p in predictions.iter().filter(|p| p.training == training) {
+        for j in 0..robot.n_joints() {
+            for (measured, predicted) in p.measured[j].iter().zip(&p.predicted[j]) {
+                statistics.push(j, *measured, *predicted);
+            }
+        }
+    }
+    if !predictions.iter().any(|p| p.training == training) {
+        return None;
+    }
+    let joints = robot.joints().iter().zip(statistics.all());
+    Some(ErrorResult {
+        relative_error: statistics.relative_error(),
+        joints: joints
+            .map(|(joint, s)| JointError {
+                name: joint.name.clone(),
+                rms: s.rms,
+                relative_error: s.relative_error,
+                r2: s.r2,
+            })
+            .collect(),
+    })
+}

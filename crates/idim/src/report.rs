@@ -1,0 +1,133 @@
+//! What a person reads first: tables on the terminal.
+
+use crate::identify::Identification;
+use crate::result::{
+    ErrorResult, EstimateResult, IdentificationResult, PaperNumber, ReductionResult,
+};
+use crate::table::{number, optional, table};
+use std::fmt::Write as _;
+
+/// The structure of a robot.
+pub fn reduction_text(robot: &str, reduction: &ReductionResult) -> String {
+    let mut out = format!(
+        "{robot}: {} base parameters of {} standard ones ({} unidentifiable, {} regrouped, {} of the base identifiable alone); rank gap {}\n\n",
+        reduction.base.len(),
+        reduction.standard.len(),
+        reduction.unidentifiable.len(),
+        reduction.combined.len(),
+        reduction.identifiable_alone.len(),
+        number(reduction.rank_gap),
+    );
+    for base in &reduction.base {
+        let _ = writeln!(out, "  {}", base.relation);
+    }
+    if !reduction.unidentifiable.is_empty() {
+        let _ = writeln!(
+            out,
+            "\n  no torque depends on: {}",
+            reduction.unidentifiable.join(" ")
+        );
+    }
+    out
+}
+
+/// A whole identification from logs.
+pub fn identification_text(identification: &Identification) -> String {
+    let r = &identification.result;
+    let mut out = reduction_text(&r.robot, &r.reduction);
+    if !r.conditioning.is_empty() {
+        out += "\nData\n";
+        for choice in &r.conditioning {
+            let _ = writeln!(out, "  {choice}");
+        }
+    }
+    if let Some(estimate) = &r.estimate {
+        out += &estimate_text(estimate);
+    }
+    out += &errors_text(r);
+    out += &warnings_text(&r.warnings);
+    out
+}
+
+fn estimate_text(estimate: &EstimateResult) -> String {
+    let rows = estimate.parameters.iter().map(|p| {
+        let percent = p
+            .relative_std
+            .map_or_else(|| "-".into(), |s| format!("{:.1}", 100.0 * s));
+        [p.name.clone(), optional(p.value), optional(p.std), percent]
+    });
+    let c = &estimate.condition_number;
+    format!(
+        "\nParameters (SI), {}\n{}condition number (2-norm): raw {}, equilibrated {}, weighted {}\n",
+        estimate.method,
+        table(["parameter", "value", "std", "std %"], rows),
+        optional(c.raw),
+        optional(c.equilibrated),
+        optional(c.weighted),
+    )
+}
+
+fn errors_text(r: &IdentificationResult) -> String {
+    let (Some(train), validation) = (&r.train, &r.validation) else {
+        return String::new();
+    };
+    let rows = train.joints.iter().enumerate().map(|(k, t)| {
+        let v = validation.as_ref().map(|v| &v.joints[k]);
+        [
+            t.name.clone(),
+            number(t.rms),
+            percent(t.relative_error),
+            format!("{:.4}", t.r2),
+            v.map_or_else(String::new, |v| number(v.rms)),
+            v.map_or_else(String::new, |v| percent(v.relative_error)),
+            v.map_or_else(String::new, |v| format!("{:.4}", v.r2)),
+        ]
+    });
+    let overall = |e: &ErrorResult| percent(e.relative_error);
+    format!(
+        "\nPredicted against recorded torque (relative error: rms of the residual over rms of the torque)\n{}all joints: training {} %, held out {} %\n",
+        table(
+            [
+                "joint",
+                "train rms N·m",
+                "rel. %",
+                "R2",
+                "held-out rms N·m",
+                "rel. %",
+                "R2"
+            ],
+            rows
+        ),
+        overall(train),
+        validation.as_ref().map_or_else(|| "-".into(), overall),
+    )
+}
+
+fn percent(x: f64) -> String {
+    format!("{:.2}", 100.0 * x)
+}
+
+/// Ours beside the printed numbers.
+pub fn paper_text(numbers: &[PaperNumber]) -> String {
+    let rows = numbers.iter().map(|n| {
+        [
+            n.what.clone(),
+            optional(n.printed),
+            number(n.ours),
+            n.note.clone(),
+        ]
+    });
+    table(["", "printed", "ours", ""], rows)
+}
+
+/// What a reader must know.
+pub fn warnings_text(warnings: &[String]) -> String {
+    if warnings.is_empty() {
+        return String::new();
+    }
+    let mut out = String::from("\nMind\n");
+    for w in warnings {
+        let _ = writeln!(out, "  - {w}");
+    }
+    out
+}
