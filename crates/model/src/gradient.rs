@@ -34,7 +34,7 @@ pub fn torque_contraction_gradient(
     let (n, n_samples) = (model.n_joints(), states.n_samples());
     assert_eq!(u.len(), n * n_samples, "u is not joints × samples");
     let terms = [Term::new(model, columns, v)];
-    let mut weights = vec![F64x8::ZERO; n];
+    let mut weights = vec![F64x8::splat(0.0); n];
     over_lanes(model, states, |first, lanes, work| {
         for j in 0..n {
             weights[j] = eight(&u[j * n_samples..][..n_samples], first);
@@ -148,9 +148,9 @@ fn over_lanes(
         let here = first..n_samples.min(first + 8);
         let count = here.len();
         for (j, bar) in work.out.iter().enumerate() {
-            gradient.q_mut(j)[here.clone()].copy_from_slice(&bar.q.0[..count]);
-            gradient.qd_mut(j)[here.clone()].copy_from_slice(&bar.qd.0[..count]);
-            gradient.qdd_mut(j)[here.clone()].copy_from_slice(&bar.qdd.0[..count]);
+            gradient.q_mut(j)[here.clone()].copy_from_slice(&bar.q.as_array()[..count]);
+            gradient.qd_mut(j)[here.clone()].copy_from_slice(&bar.qd.as_array()[..count]);
+            gradient.qdd_mut(j)[here.clone()].copy_from_slice(&bar.qdd.as_array()[..count]);
         }
     }
     gradient

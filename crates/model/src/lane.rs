@@ -19,13 +19,37 @@ pub(crate) trait Lane:
     fn sign(self) -> Self;
 }
 
+/// What eight numbers are kept in: a vector of the machine, so that the compiler never takes them apart.
+#[cfg(target_arch = "x86_64")]
+type Eight = std::arch::x86_64::__m512d;
+#[cfg(not(target_arch = "x86_64"))]
+type Eight = [f64; 8];
+
 /// Eight samples side by side, a cache line.
-#[derive(Debug, Clone, Copy, PartialEq)]
+///
+/// Every operation is written out number by number and compiles to as few instructions as the machine allows.
+#[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
-pub(crate) struct F64x8(pub(crate) [f64; 8]);
+pub(crate) struct F64x8(Eight);
 
 impl F64x8 {
-    pub(crate) const ZERO: Self = Self([0.0; 8]);
+    #[inline(always)]
+    pub(crate) fn new(x: [f64; 8]) -> Self {
+        Self(bytemuck::must_cast(x))
+    }
+
+    #[inline(always)]
+    pub(crate) fn array(self) -> [f64; 8] {
+        bytemuck::must_cast(self.0)
+    }
+
+    pub(crate) fn as_array(&self) -> &[f64; 8] {
+        bytemuck::must_cast_ref(&self.0)
+    }
+
+    pub(crate) fn as_array_mut(&mut self) -> &mut [f64; 8] {
+        bytemuck::must_cast_mut(&mut self.0)
+    }
 }
 
 macro_rules! lanewise {
@@ -34,11 +58,12 @@ macro_rules! lanewise {
             type Output = Self;
             #[inline(always)]
             fn $method(self, o: Self) -> Self {
+                let (a, b) = (self.array(), o.array());
                 let mut r = [0.0; 8];
                 for k in 0..8 {
-                    r[k] = self.0[k] $op o.0[k];
+                    r[k] = a[k] $op b[k];
                 }
-                Self(r)
+                Self::new(r)
             }
         }
     };
@@ -51,11 +76,12 @@ impl Neg for F64x8 {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
+        let a = self.array();
         let mut r = [0.0; 8];
         for k in 0..8 {
-            r[k] = -self.0[k];
+            r[k] = -a[k];
         }
-        Self(r)
+        Self::new(r)
     }
 }
 
@@ -85,37 +111,42 @@ impl Lane for f64 {
 impl Lane for F64x8 {
     #[inline(always)]
     fn splat(x: f64) -> Self {
-        Self([x; 8])
+        Self::new([x; 8])
     }
     #[inline(always)]
     fn mul_add(self, a: Self, b: Self) -> Self {
+        let (x, a, b) = (self.array(), a.array(), b.array());
         let mut r = [0.0; 8];
         for k in 0..8 {
-            r[k] = f64::mul_add(self.0[k], a.0[k], b.0[k]);
+            r[k] = f64::mul_add(x[k], a[k], b[k]);
         }
-        Self(r)
+        Self::new(r)
     }
     #[inline(always)]
     fn sin_cos(self, quarters: u64) -> (Self, Self) {
+        let x = self.array();
         let (mut s, mut c) = ([0.0; 8], [0.0; 8]);
+        let mut all_small = true;
         for k in 0..8 {
-            (s[k], c[k]) = sin_cos_reduced(self.0[k], quarters);
+            (s[k], c[k]) = sin_cos_reduced(x[k], quarters);
+            all_small &= x[k].abs() <= REDUCTION_LIMIT;
         }
         // A branch a lane would break the vector code; angles this large are rare, and done again one by one.
-        if !self.0.iter().all(|x| x.abs() <= REDUCTION_LIMIT) {
+        if !all_small {
             for k in 0..8 {
-                (s[k], c[k]) = Lane::sin_cos(self.0[k], quarters);
+                (s[k], c[k]) = Lane::sin_cos(x[k], quarters);
             }
         }
-        (Self(s), Self(c))
+        (Self::new(s), Self::new(c))
     }
     #[inline(always)]
     fn sign(self) -> Self {
+        let x = self.array();
         let mut r = [0.0; 8];
         for k in 0..8 {
-            r[k] = self.0[k].sign();
+            r[k] = x[k].sign();
         }
-        Self(r)
+        Self::new(r)
     }
 }
 
@@ -249,12 +280,12 @@ mod tests {
 
         #[test]
         fn identity_eight_lanes_give_the_bits_of_one(x in -10.0..10.0_f64, quarters in 0..4_u64) {
-            let eight = F64x8([x, -x, x + 1.0, x - 1.0, x * 0.5, x * 3.0, 1.0e7 * x, 0.0]);
+            let eight = F64x8::new([x, -x, x + 1.0, x - 1.0, x * 0.5, x * 3.0, 1.0e7 * x, 0.0]);
             let (s, c) = eight.sin_cos(quarters);
             for k in 0..8 {
-                let (s1, c1) = Lane::sin_cos(eight.0[k], quarters);
-                prop_assert_eq!(s.0[k].to_bits(), s1.to_bits());
-                prop_assert_eq!(c.0[k].to_bits(), c1.to_bits());
+                let (s1, c1) = Lane::sin_cos(eight.array()[k], quarters);
+                prop_assert_eq!(s.array()[k].to_bits(), s1.to_bits());
+                prop_assert_eq!(c.array()[k].to_bits(), c1.to_bits());
             }
         }
     }

@@ -49,7 +49,7 @@ pub fn inverse_dynamics_batch(model: &Model, parameters: &[f64], states: &JointS
     let mut torque = vec![0.0; n * n_samples];
     let mut work = Workspace::new(model);
     let mut lanes = LaneStates::new(n);
-    let mut out = vec![F64x8::ZERO; n];
+    let mut out = vec![F64x8::splat(0.0); n];
     for first in (0..n_samples).step_by(8) {
         lanes.load(states, first);
         dispatch(Recursion {
@@ -61,7 +61,7 @@ pub fn inverse_dynamics_batch(model: &Model, parameters: &[f64], states: &JointS
         });
         let count = (n_samples - first).min(8);
         for j in 0..n {
-            torque[j * n_samples + first..][..count].copy_from_slice(&out[j].0[..count]);
+            torque[j * n_samples + first..][..count].copy_from_slice(&out[j].as_array()[..count]);
         }
     }
     torque

@@ -10,7 +10,7 @@ use crate::lane::{Lane, V3, minus, splat, times, zero};
 use crate::model::{Direction, KernelJoint, Model};
 use crate::parameter::{Columns, ParameterKind};
 use crate::robot::JointKind;
-use crate::wrench_map::WrenchMap;
+use crate::wrench_map::{ABOUT_Z, ACROSS, ANY, WrenchMap};
 
 /// Which entry of which link goes to which column, found once.
 #[derive(Debug, Clone)]
@@ -325,46 +325,66 @@ fn project_along<T: Lane>(
     p: usize,
     rows: &mut [T],
 ) {
+    let n = kinematics.n;
     for d in &joint.directions {
+        let v = kinematics.direction[j * n + d.index];
+        let joints = &joint.path[d.range.clone()];
+        let linear = &kinematics.linear[j * n..][..n];
         let own = d.index + 1 == joint.directions.len();
-        let v = kinematics.direction[j * kinematics.n + d.index];
-        if d.kind == JointKind::Prismatic {
-            let row = &mut rows[joint.path[d.range.start] * p..][..p];
-            for k in 6..10 {
-                if link.wants(k) {
-                    link.put(k, row, map.force_entry(k, v));
+        match (d.kind, own, d.across) {
+            (JointKind::Prismatic, _, _) => {
+                let row = &mut rows[joints[0] * p..][..p];
+                for k in 6..10 {
+                    if link.wants(k) {
+                        link.put(k, row, map.force_entry(k, v));
+                    }
                 }
             }
-            continue;
+            (_, true, _) => {
+                let below = &joints[..joints.len() - 1];
+                project_direction::<T, ABOUT_Z>(below, v, linear, map, link, p, rows);
+                let row = &mut rows[j * p..][..p];
+                for k in 0..8 {
+                    if link.wants(k) {
+                        let entry = if k < 6 {
+                            map.tensor_entry::<ABOUT_Z>(k, v)
+                        } else {
+                            map.own_moment_entry(k)
+                        };
+                        link.put(k, row, entry);
+                    }
+                }
+            }
+            (_, _, true) => project_direction::<T, ACROSS>(joints, v, linear, map, link, p, rows),
+            _ => project_direction::<T, ANY>(joints, v, linear, map, link, p, rows),
         }
-        let mut tensor = [T::splat(0.0); 6];
-        for k in 0..6 {
+    }
+}
+
+/// Rows of parallel revolute joints: what the tensor's columns say is the same in all of them.
+#[inline(always)]
+fn project_direction<T: Lane, const FORM: u8>(
+    joints: &[usize],
+    v: V3<T>,
+    linear: &[V3<T>],
+    map: &WrenchMap<T>,
+    link: &LinkPlan,
+    p: usize,
+    rows: &mut [T],
+) {
+    for k in 0..6 {
+        if link.wants(k) {
+            let entry = map.tensor_entry::<FORM>(k, v);
+            for &i in joints {
+                link.put(k, &mut rows[i * p..][..p], entry);
+            }
+        }
+    }
+    for &i in joints {
+        let row = &mut rows[i * p..][..p];
+        for k in 6..10 {
             if link.wants(k) {
-                tensor[k] = match (own, d.across) {
-                    (true, _) => map.tensor_entry_about_z(k),
-                    (false, true) => map.tensor_entry_across(k, v),
-                    (false, false) => map.tensor_entry(k, v),
-                };
-            }
-        }
-        for &i in &joint.path[d.range.clone()] {
-            let row = &mut rows[i * p..][..p];
-            for k in 0..6 {
-                if link.wants(k) {
-                    link.put(k, row, tensor[k]);
-                }
-            }
-            let f = kinematics.linear[j * kinematics.n + i];
-            for k in 6..10 {
-                if link.wants(k) {
-                    let entry = match (own, i == j) {
-                        (true, true) => map.moment_entry_about_z(k),
-                        (true, false) => map.moment_entry_parallel(k, f),
-                        _ if d.across => map.moment_entry_across(k, v, f),
-                        _ => map.moment_entry(k, v, f),
-                    };
-                    link.put(k, row, entry);
-                }
+                link.put(k, row, map.moment_entry::<FORM>(k, v, linear[i]));
             }
         }
     }
@@ -390,9 +410,9 @@ fn project_posed<T: Lane>(
             for k in 0..10 {
                 if link.wants(k) {
                     let entry = if k < 6 {
-                        map.tensor_entry(k, axis.angular)
+                        map.tensor_entry::<ANY>(k, axis.angular)
                     } else {
-                        map.moment_entry(k, axis.angular, axis.linear)
+                        map.moment_entry::<ANY>(k, axis.angular, axis.linear)
                     };
                     link.put(k, row, entry);
                 }

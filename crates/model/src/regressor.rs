@@ -106,7 +106,7 @@ impl RegressorBlock {
             n_samples: 0,
             n_joints,
             n_columns,
-            entries: vec![F64x8::ZERO; n_joints * n_columns],
+            entries: vec![F64x8::splat(0.0); n_joints * n_columns],
         }
     }
 
@@ -146,12 +146,12 @@ impl RegressorBlock {
 
     /// One entry of the regressor for the eight samples; beyond `n_samples` the last sample is repeated.
     pub fn lanes(&self, joint: usize, column: usize) -> &[f64; 8] {
-        &self.entries[joint * self.n_columns + column].0
+        self.entries[joint * self.n_columns + column].as_array()
     }
 
     /// One entry for the eight samples, to fill in: of a block of weights.
     pub fn lanes_mut(&mut self, joint: usize, column: usize) -> &mut [f64; 8] {
-        &mut self.entries[joint * self.n_columns + column].0
+        self.entries[joint * self.n_columns + column].as_array_mut()
     }
 
     /// One row of one sample.
@@ -163,7 +163,7 @@ impl RegressorBlock {
         assert_eq!(out.len(), self.n_columns, "a row has one entry a column");
         let row = &self.entries[joint * self.n_columns..][..self.n_columns];
         for (x, e) in out.iter_mut().zip(row) {
-            *x = e.0[lane];
+            *x = e.as_array()[lane];
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Joint states: one, and many.
 
-use crate::lane::F64x8;
+use crate::lane::{F64x8, Lane};
 use crate::robot::Robot;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -166,7 +166,7 @@ pub(crate) struct LaneStates {
 
 impl LaneStates {
     pub(crate) fn new(n_joints: usize) -> Self {
-        let zeros = vec![F64x8::ZERO; n_joints];
+        let zeros = vec![F64x8::splat(0.0); n_joints];
         Self {
             q: zeros.clone(),
             qd: zeros.clone(),
@@ -190,9 +190,9 @@ impl LaneStates {
 
 pub(crate) fn eight(x: &[f64], first: usize) -> F64x8 {
     if let Some(full) = x[first..].first_chunk::<8>() {
-        return F64x8(*full);
+        return F64x8::new(*full);
     }
-    F64x8(std::array::from_fn(|k| x[(first + k).min(x.len() - 1)]))
+    F64x8::new(std::array::from_fn(|k| x[(first + k).min(x.len() - 1)]))
 }
 
 /// Span of a prismatic joint (m) drawn from where the robot states no position limits.

@@ -4,6 +4,13 @@ use crate::frame::{inner, shift};
 use crate::kinematics::{LinkMotion, Screw};
 use crate::lane::{Lane, V3, dot};
 
+/// Form of an axis: parallel to z.
+pub(crate) const ABOUT_Z: u8 = 0;
+/// Form of an axis: no part along z.
+pub(crate) const ACROSS: u8 = 1;
+/// Form of an axis: any.
+pub(crate) const ANY: u8 = 2;
+
 /// The map of a link's ten parameters to its wrench, with what its entries share computed once.
 ///
 /// Entries count as the parameters: the tensor's six, then `MX MY MZ M`. Axis: angular part `v`, linear part `f`.
@@ -90,44 +97,54 @@ impl<T: Lane> WrenchMap<T> {
         }
     }
 
-    /// Entry `k < 6` of an axis's row.
+    /// Entry `k < 6` of a revolute axis of the given form.
     #[inline(always)]
-    pub(crate) fn tensor_entry(&self, k: usize, [x, y, z]: V3<T>) -> T {
+    pub(crate) fn tensor_entry<const FORM: u8>(&self, k: usize, [x, y, z]: V3<T>) -> T {
         let b = &self.b;
-        match k {
-            0 => x.mul_add(self.m.wd[0], y.mul_add(self.xz, -(z * self.xy))),
-            1 => z.mul_add(self.x_y, y.mul_add(b[2][1], -(x * b[2][0]))),
-            2 => y.mul_add(self.z_x, x.mul_add(b[1][0], -(z * b[1][2]))),
-            3 => y.mul_add(self.m.wd[1], z.mul_add(self.xy, -(x * self.yz))),
-            4 => x.mul_add(self.y_z, z.mul_add(b[0][2], -(y * b[0][1]))),
-            _ => z.mul_add(self.m.wd[2], x.mul_add(self.yz, -(y * self.xz))),
+        let [dx, dy, dz] = self.m.wd;
+        match (FORM, k) {
+            (ABOUT_Z, 0) => -self.xy,
+            (ABOUT_Z, 1) => self.x_y,
+            (ABOUT_Z, 2) => -b[1][2],
+            (ABOUT_Z, 3) => self.xy,
+            (ABOUT_Z, 4) => b[0][2],
+            (ABOUT_Z, _) => dz,
+            (ACROSS, 0) => x.mul_add(dx, y * self.xz),
+            (ACROSS, 1) => y.mul_add(b[2][1], -(x * b[2][0])),
+            (ACROSS, 2) => y.mul_add(self.z_x, x * b[1][0]),
+            (ACROSS, 3) => y.mul_add(dy, -(x * self.yz)),
+            (ACROSS, 4) => x.mul_add(self.y_z, -(y * b[0][1])),
+            (ACROSS, _) => x.mul_add(self.yz, -(y * self.xz)),
+            (_, 0) => x.mul_add(dx, y.mul_add(self.xz, -(z * self.xy))),
+            (_, 1) => z.mul_add(self.x_y, y.mul_add(b[2][1], -(x * b[2][0]))),
+            (_, 2) => y.mul_add(self.z_x, x.mul_add(b[1][0], -(z * b[1][2]))),
+            (_, 3) => y.mul_add(dy, z.mul_add(self.xy, -(x * self.yz))),
+            (_, 4) => x.mul_add(self.y_z, z.mul_add(b[0][2], -(y * b[0][1]))),
+            (_, _) => z.mul_add(dz, x.mul_add(self.yz, -(y * self.xz))),
         }
     }
 
-    /// The same for an axis without part along z.
+    /// Entry `k >= 6` of a revolute axis with linear part `f`; about z, that part lies across z.
     #[inline(always)]
-    pub(crate) fn tensor_entry_across(&self, k: usize, [x, y, _]: V3<T>) -> T {
+    pub(crate) fn moment_entry<const FORM: u8>(&self, k: usize, [x, y, z]: V3<T>, f: V3<T>) -> T {
+        let [ax, ay, az] = self.m.a;
         let b = &self.b;
-        match k {
-            0 => x.mul_add(self.m.wd[0], y * self.xz),
-            1 => y.mul_add(b[2][1], -(x * b[2][0])),
-            2 => y.mul_add(self.z_x, x * b[1][0]),
-            3 => y.mul_add(self.m.wd[1], -(x * self.yz)),
-            4 => x.mul_add(self.y_z, -(y * b[0][1])),
-            _ => x.mul_add(self.yz, -(y * self.xz)),
+        if FORM == ABOUT_Z {
+            return match k {
+                6 => f[0].mul_add(b[0][0], f[1].mul_add(b[1][0], ay)),
+                7 => f[0].mul_add(b[0][1], f[1].mul_add(b[1][1], -ax)),
+                8 => f[0].mul_add(b[0][2], f[1] * b[1][2]),
+                _ => f[0].mul_add(ax, f[1] * ay),
+            };
         }
-    }
-
-    /// The same for the axis z.
-    #[inline(always)]
-    pub(crate) fn tensor_entry_about_z(&self, k: usize) -> T {
-        match k {
-            0 => -self.xy,
-            1 => self.x_y,
-            2 => -self.b[1][2],
-            3 => self.xy,
-            4 => self.b[0][2],
-            _ => self.m.wd[2],
+        let force = self.force_entry(k, f);
+        match (FORM, k) {
+            (ACROSS, 6) => (-y).mul_add(az, force),
+            (ACROSS, 7) => x.mul_add(az, force),
+            (_, 6) => z.mul_add(ay, (-y).mul_add(az, force)),
+            (_, 7) => x.mul_add(az, (-z).mul_add(ax, force)),
+            (_, 8) => y.mul_add(ax, (-x).mul_add(ay, force)),
+            (_, _) => force,
         }
     }
 
@@ -144,53 +161,10 @@ impl<T: Lane> WrenchMap<T> {
         }
     }
 
-    /// Entry `k >= 6` of a revolute axis.
+    /// Entries 6 and 7 of the link's own axis; the last two are zero.
     #[inline(always)]
-    pub(crate) fn moment_entry(&self, k: usize, [x, y, z]: V3<T>, f: V3<T>) -> T {
-        let [ax, ay, az] = self.m.a;
-        let force = self.force_entry(k, f);
-        match k {
-            6 => z.mul_add(ay, (-y).mul_add(az, force)),
-            7 => x.mul_add(az, (-z).mul_add(ax, force)),
-            8 => y.mul_add(ax, (-x).mul_add(ay, force)),
-            _ => force,
-        }
-    }
-
-    /// The same for an axis without part along z.
-    #[inline(always)]
-    pub(crate) fn moment_entry_across(&self, k: usize, [x, y, _]: V3<T>, f: V3<T>) -> T {
-        let [ax, ay, az] = self.m.a;
-        let force = self.force_entry(k, f);
-        match k {
-            6 => (-y).mul_add(az, force),
-            7 => x.mul_add(az, force),
-            8 => y.mul_add(ax, (-x).mul_add(ay, force)),
-            _ => force,
-        }
-    }
-
-    /// The same for an axis parallel to z, whose linear part has none along z.
-    #[inline(always)]
-    pub(crate) fn moment_entry_parallel(&self, k: usize, f: V3<T>) -> T {
-        let [ax, ay, _] = self.m.a;
-        let b = &self.b;
-        match k {
-            6 => f[0].mul_add(b[0][0], f[1].mul_add(b[1][0], ay)),
-            7 => f[0].mul_add(b[0][1], f[1].mul_add(b[1][1], -ax)),
-            8 => f[0].mul_add(b[0][2], f[1] * b[1][2]),
-            _ => f[0].mul_add(ax, f[1] * ay),
-        }
-    }
-
-    /// The same for the link's own axis; the last two are zero.
-    #[inline(always)]
-    pub(crate) fn moment_entry_about_z(&self, k: usize) -> T {
-        match k {
-            6 => self.m.a[1],
-            7 => -self.m.a[0],
-            _ => T::splat(0.0),
-        }
+    pub(crate) fn own_moment_entry(&self, k: usize) -> T {
+        if k == 6 { self.m.a[1] } else { -self.m.a[0] }
     }
 }
 
