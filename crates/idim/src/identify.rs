@@ -86,7 +86,14 @@ pub fn identify(
     };
     let train = all_stretches(&training, &plan)?;
     let held_out = all_stretches(&validation, &plan)?;
-    let fit = fit(robot, &structure, &train, &plan, &mut warnings)?;
+    let smoothed = !options.as_recorded && options.columns.coulomb;
+    let (plan, fit) = if smoothed {
+        best_reversal(robot, &structure, &train, &plan)?
+    } else {
+        let fit = fit(robot, &structure, &train, &plan)?;
+        (plan, fit)
+    };
+    warnings.extend(fit.warnings.iter().cloned());
     let predictions: Vec<Prediction> = [(true, &train), (false, &held_out)]
         .into_iter()
         .flat_map(|(is_training, all)| all.iter().map(move |s| (is_training, s)))
@@ -134,6 +141,48 @@ struct Fit {
     columns: Columns,
     values: Vec<f64>,
     result: EstimateResult,
+    warnings: Vec<String>,
+    /// Sum over the joints of the logarithm of the residual's standard deviation: smaller fits better.
+    misfit: f64,
+}
+
+impl Fit {
+    fn new(
+        columns: Columns,
+        fit: &WeightedEstimate,
+        result: EstimateResult,
+        warnings: Vec<String>,
+    ) -> Self {
+        let noise = fit.noise.standard_deviation();
+        Self {
+            columns,
+            values: fit.estimate.values.clone(),
+            result,
+            warnings,
+            misfit: noise.iter().map(|s| s.ln()).sum(),
+        }
+    }
+}
+
+/// Speeds (rad/s) over which the Coulomb torque may change sign: from hardly smoothed to that of a noisy velocity.
+const REVERSAL_SPEEDS: [f64; 3] = [0.001, 0.005, 0.02];
+
+/// The smoothing of the Coulomb torque that fits the training data best, and its fit.
+fn best_reversal(
+    robot: &Robot,
+    structure: &Structure,
+    train: &[Stretch],
+    plan: &SamplingPlan,
+) -> Result<(SamplingPlan, Fit), Error> {
+    let mut best: Option<(SamplingPlan, Fit)> = None;
+    for speed in REVERSAL_SPEEDS {
+        let plan = plan.with_coulomb_speed(speed);
+        let fit = fit(robot, structure, train, &plan)?;
+        if best.as_ref().is_none_or(|(_, b)| fit.misfit < b.misfit) {
+            best = Some((plan, fit));
+        }
+    }
+    best.ok_or_else(|| Error::input("estimate", "no fit", "a defect of this program"))
 }
 
 fn fit(
@@ -141,7 +190,6 @@ fn fit(
     structure: &Structure,
     train: &[Stretch],
     plan: &SamplingPlan,
-    warnings: &mut Vec<String>,
 ) -> Result<Fit, Error> {
     let columns = structure.base_columns();
     let mut rows = Rows::default();
@@ -156,13 +204,9 @@ fn fit(
                 &names,
                 "weighted least squares, one variance a joint, iterated",
             );
-            Ok(Fit {
-                columns,
-                values: estimate.estimate.values,
-                result,
-            })
+            Ok(Fit::new(columns, &estimate, result, Vec::new()))
         }
-        WeightedSolution::RankDeficient(_) => excited_fit(robot, &columns, &names, &rows, warnings),
+        WeightedSolution::RankDeficient(_) => excited_fit(robot, &columns, &names, &rows),
     }
 }
 
@@ -183,7 +227,6 @@ fn excited_fit(
     columns: &Columns,
     names: &[String],
     rows: &Rows,
-    warnings: &mut Vec<String>,
 ) -> Result<Fit, Error> {
     let p = columns.len();
     let mut factor = TriangularFactor::new(p);
@@ -192,12 +235,16 @@ fn excited_fit(
     let reduction = reduce(&factor, &order, &ReductionOptions::default());
     let kept = &reduction.base;
     let excited_names = reduction.base_names(names);
-    warnings.push(format!(
+    let warning = format!(
         "this log excites only {} of {} base parameters; not determined on their own: {}. Move every joint, faster and in more directions, or hold still joints with --lock",
         kept.len(),
         p,
-        (0..p).filter(|k| !reduction.identifiable_alone.contains(k)).map(|k| names[k].as_str()).collect::<Vec<_>>().join(", "),
-    ));
+        (0..p)
+            .filter(|k| !reduction.identifiable_alone.contains(k))
+            .map(|k| names[k].as_str())
+            .collect::<Vec<_>>()
+            .join(", "),
+    );
     let mut w = Vec::with_capacity(rows.y.len() * kept.len());
     for row in rows.w.chunks_exact(p) {
         w.extend(kept.iter().map(|&k| row[k]));
@@ -222,11 +269,12 @@ fn excited_fit(
         &excited_names,
         "weighted least squares on the parameters this log excites",
     );
-    Ok(Fit {
-        columns: columns.select(kept),
-        values: estimate.estimate.values,
+    Ok(Fit::new(
+        columns.select(kept),
+        &estimate,
         result,
-    })
+        vec![warning],
+    ))
 }
 
 fn estimate_result(fit: &WeightedEstimate, names: &[String], method: &str) -> EstimateResult {

@@ -12,6 +12,9 @@ pub(crate) struct Logs {
     pub(crate) notes: Vec<String>,
 }
 
+/// Fewer samples of every joint than this cannot tell a dozen parameters a joint from noise.
+const FEWEST_SAMPLES: usize = 50;
+
 /// Reads and checks logs of one robot.
 pub(crate) fn read_logs(files: &[PathBuf], loaded: &LoadedRobot) -> Result<Logs, Error> {
     let labels = joint_labels(&loaded.robot, &loaded.described);
@@ -27,6 +30,13 @@ pub(crate) fn read_logs(files: &[PathBuf], loaded: &LoadedRobot) -> Result<Logs,
             &labels,
             &ColumnMapping::default(),
         )?;
+        if log.n_samples() < FEWEST_SAMPLES {
+            return Err(Error::input(
+                path.display().to_string(),
+                format!("{} samples", log.n_samples()),
+                format!("identification needs at least {FEWEST_SAMPLES}; record a longer motion"),
+            ));
+        }
         let warnings = check_log(&log, &loaded.robot)?;
         let said = log.notes.iter().chain(&warnings);
         logs.notes

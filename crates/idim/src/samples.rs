@@ -33,9 +33,8 @@ const POSITION_CUTOFF: f64 = 20.0;
 const DECIMATED_BAND: f64 = 1.25;
 /// Order of the Butterworth low-pass of positions.
 const ORDER: usize = 4;
-/// Speed over which a smoothed Coulomb torque changes sign, rad/s; its share for a prismatic joint, m/s.
-const COULOMB_SPEED: f64 = 0.02;
-const COULOMB_SPEED_PRISMATIC: f64 = 0.002;
+/// A prismatic joint's smoothing speed, m/s, per rad/s of a revolute one.
+const PRISMATIC_SPEED: f64 = 0.1;
 
 impl SamplingPlan {
     /// q, q̇, q̈ and torque taken as they are.
@@ -88,7 +87,6 @@ impl SamplingPlan {
             format!(
                 "parallel decimation of regressor and torque: one sample in {factor}, after the same low-pass",
             ),
-            format!("Coulomb friction: tanh(qd / {COULOMB_SPEED} rad/s)"),
         ];
         Self {
             cutoff: Some(cutoff),
@@ -98,9 +96,21 @@ impl SamplingPlan {
             } else {
                 Derivatives::OfPositions
             },
-            coulomb_speed: COULOMB_SPEED,
+            coulomb_speed: 0.0,
             choices,
         }
+    }
+}
+
+impl SamplingPlan {
+    /// The same plan with the Coulomb torque smoothed over a speed, rad/s.
+    pub(crate) fn with_coulomb_speed(&self, speed: f64) -> Self {
+        let mut plan = self.clone();
+        plan.coulomb_speed = speed;
+        plan.choices.push(format!(
+            "Coulomb friction: tanh(qd / {speed} rad/s), the smoothing that fits the training data best"
+        ));
+        plan
     }
 }
 
@@ -233,7 +243,7 @@ pub(crate) fn visit_rows(
         .iter()
         .map(|j| match j.kind {
             JointKind::Revolute => coulomb_speed,
-            JointKind::Prismatic => coulomb_speed * COULOMB_SPEED_PRISMATIC / COULOMB_SPEED,
+            JointKind::Prismatic => coulomb_speed * PRISMATIC_SPEED,
         })
         .collect();
     let mut row = vec![0.0; columns.len()];

@@ -92,6 +92,12 @@ pub struct Recovered {
     pub rigid: Vec<usize>,
     /// Noise of one sample between the joints, from the scatter between periods; `None` for a single period.
     pub noise: Option<Vec<Vec<f64>>>,
+    /// The base columns the estimates belong to.
+    pub columns: Columns,
+    /// States of one period, as processed.
+    pub states: JointStates,
+    /// Averaged torques of that period, joint by joint, N·m.
+    pub torque: Vec<Vec<f64>>,
 }
 
 impl Recovered {
@@ -210,6 +216,9 @@ impl<'a> Experiment<'a> {
             truth,
             rigid,
             noise,
+            columns,
+            states,
+            torque,
         })
     }
 
