@@ -176,7 +176,7 @@ fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<()
     )?;
     identification.result.warnings.extend(notes);
     progress.stage("drawing");
-    let plots = plots::of_identification(&identification, &loaded.robot);
+    let plots = plots::of_predictions(&identification.predictions, &loaded.robot);
     progress.finish();
     say(out, &identification_text(&identification))?;
     write_results(&args.out, &identification.result, &plots, out)

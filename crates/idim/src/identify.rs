@@ -11,8 +11,8 @@ use crate::structure::{KeepOrder, Structure};
 use faer::MatRef;
 use idim_base_params::{ReductionOptions, TriangularFactor, reduce};
 use idim_estimation::{
-    ResidualStatistics, WeightedEstimate, WeightedSolution, Weighting, WeightingOptions,
-    weighted_least_squares_dense,
+    Estimate, ResidualStatistics, Solution, WeightedSolution, Weighting, WeightingOptions,
+    factor_of, solve, weighted_least_squares_dense,
 };
 use idim_measurement::Measurements;
 use idim_model::{Columns, DriveColumns, Robot};
@@ -104,6 +104,7 @@ pub fn identify(
             predicted: predict(robot, &fit.columns, &fit.values, s, &plan),
         })
         .collect();
+    let joints = joint_names(robot);
     let result = IdentificationResult {
         schema: SCHEMA,
         version: env!("CARGO_PKG_VERSION"),
@@ -111,8 +112,8 @@ pub fn identify(
         seed: options.seed,
         reduction: structure.to_result(),
         estimate: Some(fit.result),
-        train: errors(robot, &predictions, true),
-        validation: errors(robot, &predictions, false),
+        train: errors(&joints, &predictions, true),
+        validation: errors(&joints, &predictions, false),
         excitation: None,
         paper: Vec::new(),
         conditioning: plan.choices.clone(),
@@ -120,7 +121,7 @@ pub fn identify(
     };
     Ok(Identification {
         result,
-        joints: robot.joints().iter().map(|j| j.name.clone()).collect(),
+        joints,
         predictions,
     })
 }
@@ -147,19 +148,13 @@ struct Fit {
 }
 
 impl Fit {
-    fn new(
-        columns: Columns,
-        fit: &WeightedEstimate,
-        result: EstimateResult,
-        warnings: Vec<String>,
-    ) -> Self {
-        let noise = fit.noise.standard_deviation();
+    fn new(columns: Columns, solved: &Solved, names: &[String], warnings: Vec<String>) -> Self {
         Self {
             columns,
-            values: fit.estimate.values.clone(),
-            result,
+            values: solved.estimate.values.clone(),
+            result: estimate_result(solved, names),
             warnings,
-            misfit: noise.iter().map(|s| s.ln()).sum(),
+            misfit: solved.misfit,
         }
     }
 }
@@ -197,17 +192,50 @@ fn fit(
         push_rows(&mut rows, robot, &columns, stretch, plan)?;
     }
     let names = structure.base_names();
-    match weighted(&rows, columns.len(), robot.n_joints())? {
-        WeightedSolution::Determined(estimate) => {
-            let result = estimate_result(
-                &estimate,
-                &names,
-                "weighted least squares, one variance a joint, iterated",
-            );
-            Ok(Fit::new(columns, &estimate, result, Vec::new()))
-        }
-        WeightedSolution::RankDeficient(_) => excited_fit(robot, &columns, &names, &rows),
+    match solved(&rows, columns.len(), robot.n_joints())? {
+        Some(solved) => Ok(Fit::new(columns, &solved, &names, Vec::new())),
+        None => excited_fit(robot, &columns, &names, &rows),
     }
+}
+
+/// A fit of all columns, and how it was made.
+struct Solved {
+    estimate: Estimate,
+    condition: ConditionResult,
+    method: &'static str,
+    misfit: f64,
+}
+
+/// Weighted by the noise of the joints; ordinary where the weights themselves make the rows dependent, as those of a
+/// joint that is fitted exactly do. `None` where the columns are dependent.
+fn solved(rows: &Rows, n_columns: usize, n_joints: usize) -> Result<Option<Solved>, Error> {
+    if let WeightedSolution::Determined(fit) = weighted(rows, n_columns, n_joints)? {
+        let noise = fit.noise.standard_deviation();
+        return Ok(Some(Solved {
+            condition: ConditionResult {
+                raw: Some(fit.ordinary.condition_number.raw),
+                equilibrated: Some(fit.ordinary.condition_number.equilibrated),
+                weighted: Some(fit.estimate.condition_number.raw),
+            },
+            estimate: fit.estimate,
+            method: "weighted least squares, one variance a joint, iterated",
+            misfit: noise.iter().map(|s| s.ln()).sum(),
+        }));
+    }
+    let w = MatRef::from_row_major_slice(&rows.w, rows.y.len(), n_columns);
+    let Solution::Determined(estimate) = solve(&factor_of(w, &rows.y)?)? else {
+        return Ok(None);
+    };
+    Ok(Some(Solved {
+        condition: ConditionResult {
+            raw: Some(estimate.condition_number.raw),
+            equilibrated: Some(estimate.condition_number.equilibrated),
+            weighted: None,
+        },
+        misfit: n_joints as f64 * estimate.sigma.ln(),
+        estimate,
+        method: "ordinary least squares: a joint without residual has no weight",
+    }))
 }
 
 fn weighted(rows: &Rows, n_columns: usize, n_joints: usize) -> Result<WeightedSolution, Error> {
@@ -253,8 +281,7 @@ fn excited_fit(
         w,
         y: rows.y.clone(),
     };
-    let WeightedSolution::Determined(estimate) = weighted(&reduced, kept.len(), robot.n_joints())?
-    else {
+    let Some(solved) = solved(&reduced, kept.len(), robot.n_joints())? else {
         return Err(Error::input(
             "estimate",
             format!(
@@ -264,64 +291,61 @@ fn excited_fit(
             "record a motion that moves every joint",
         ));
     };
-    let result = estimate_result(
-        &estimate,
-        &excited_names,
-        "weighted least squares on the parameters this log excites",
-    );
     Ok(Fit::new(
         columns.select(kept),
-        &estimate,
-        result,
+        &solved,
+        &excited_names,
         vec![warning],
     ))
 }
 
-fn estimate_result(fit: &WeightedEstimate, names: &[String], method: &str) -> EstimateResult {
-    let e = &fit.estimate;
+fn estimate_result(solved: &Solved, names: &[String]) -> EstimateResult {
+    let e = &solved.estimate;
     let finite = |x: f64| x.is_finite().then_some(x);
+    let parameter = |(k, name): (usize, &String)| ParameterResult {
+        name: name.clone(),
+        value: Some(e.values[k]),
+        std: finite(e.standard_deviation[k]),
+        relative_std: finite(e.relative_std[k]),
+    };
     EstimateResult {
-        method: method.into(),
-        parameters: names
-            .iter()
-            .enumerate()
-            .map(|(k, name)| ParameterResult {
-                name: name.clone(),
-                value: Some(e.values[k]),
-                std: finite(e.standard_deviation[k]),
-                relative_std: finite(e.relative_std[k]),
-            })
-            .collect(),
-        condition_number: ConditionResult {
-            raw: Some(fit.ordinary.condition_number.raw),
-            equilibrated: Some(fit.ordinary.condition_number.equilibrated),
-            weighted: Some(e.condition_number.raw),
-        },
+        method: solved.method.into(),
+        parameters: names.iter().enumerate().map(parameter).collect(),
+        condition_number: solved.condition,
     }
 }
 
-fn errors(robot: &Robot, predictions: &[Prediction], training: bool) -> Option<ErrorResult> {
-    let mut statistics = ResidualStatistics::new(robot.n_joints());
+/// Errors over the predictions of one part; `None` where there are none.
+pub(crate) fn errors(
+    joints: &[String],
+    predictions: &[Prediction],
+    training: bool,
+) -> Option<ErrorResult> {
+    let mut statistics = ResidualStatistics::new(joints.len());
+    let mut any = false;
     for p in predictions.iter().filter(|p| p.training == training) {
-        for j in 0..robot.n_joints() {
+        any = true;
+        for j in 0..joints.len() {
             for (measured, predicted) in p.measured[j].iter().zip(&p.predicted[j]) {
                 statistics.push(j, *measured, *predicted);
             }
         }
     }
-    if !predictions.iter().any(|p| p.training == training) {
-        return None;
-    }
-    let joints = robot.joints().iter().zip(statistics.all());
-    Some(ErrorResult {
+    let all = joints.iter().zip(statistics.all());
+    any.then(|| ErrorResult {
         relative_error: statistics.relative_error(),
-        joints: joints
-            .map(|(joint, s)| JointError {
-                name: joint.name.clone(),
+        joints: all
+            .map(|(name, s)| JointError {
+                name: name.clone(),
                 rms: s.rms,
                 relative_error: s.relative_error,
                 r2: s.r2,
             })
             .collect(),
     })
+}
+
+/// Names of a robot's joints.
+pub(crate) fn joint_names(robot: &Robot) -> Vec<String> {
+    robot.joints().iter().map(|j| j.name.clone()).collect()
 }

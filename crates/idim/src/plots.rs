@@ -1,7 +1,7 @@
 //! Which pictures a run leaves behind.
 
 use crate::cli::{NamedText, file_name};
-use crate::identify::Identification;
+use crate::identify::Prediction;
 use crate::plot::{Part, TorqueRun, motion_plot, torque_plot};
 use idim_model::Robot;
 use idim_trajectory::{FourierSeries, Limits, QuinticPath};
@@ -10,12 +10,11 @@ use idim_trajectory::{FourierSeries, Limits, QuinticPath};
 const MOTION_SAMPLES: usize = 1000;
 
 /// Measured against predicted torque, a file a joint.
-pub(crate) fn of_identification(identification: &Identification, robot: &Robot) -> Vec<NamedText> {
+pub(crate) fn of_predictions(predictions: &[Prediction], robot: &Robot) -> Vec<NamedText> {
     let joints = robot.joints().iter().enumerate();
     joints
         .map(|(j, joint)| {
-            let runs: Vec<TorqueRun> = identification
-                .predictions
+            let runs: Vec<TorqueRun> = predictions
                 .iter()
                 .map(|p| TorqueRun {
                     part: if p.training {

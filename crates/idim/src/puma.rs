@@ -4,11 +4,13 @@ mod tables;
 
 use crate::cli::NamedText;
 use crate::error::Error;
+use crate::identify::{Prediction, errors, joint_names};
 use crate::noise_study::noise_study;
 use crate::papers::gautier_khalil;
 use crate::plots;
 use crate::progress::Progress;
 use crate::result::IdentificationResult;
+use crate::samples::visit_rows;
 use crate::structure::{KeepOrder, Structure};
 use idim_excitation::{
     ConditionStatistics, Criterion, EnergyDesign, PointDesign, PointLimits, PowellOptions,
@@ -44,12 +46,15 @@ pub struct PumaRun {
     /// Its limits.
     pub path_limits: Limits,
     robot: Robot,
+    torques: Prediction,
 }
 
 impl PumaRun {
-    /// The path between its limits.
+    /// Torques along the path, and the path between its limits.
     pub fn plots(&self) -> Vec<NamedText> {
-        plots::of_path(&self.robot, &self.path, &self.path_limits)
+        let mut plots = plots::of_predictions(std::slice::from_ref(&self.torques), &self.robot);
+        plots.extend(plots::of_path(&self.robot, &self.path, &self.path_limits));
+        plots
     }
 }
 
@@ -115,13 +120,18 @@ pub fn run(seed: u64, progress: &Progress) -> Result<PumaRun, Error> {
         bad: &bad,
     };
     let text = tables::text(&found);
-    let result = tables::result(&found, seed);
+    let mut result = tables::result(&found, seed);
+    let energy = energy_prediction(&design, &motion.points.points, &x, &good.estimate.values);
+    let torques = torque_prediction(&robot, &structure, &motion.path, &x, &good.estimate.values);
+    result.train = errors(&["energy difference".to_owned()], &[energy], true);
+    result.validation = errors(&joint_names(&robot), std::slice::from_ref(&torques), false);
     Ok(PumaRun {
         result,
         text,
         path: motion.path,
         path_limits,
         robot,
+        torques,
     })
 }
 
@@ -200,4 +210,57 @@ fn random_of_condition(design: &EnergyDesign, condition: f64, seed: u64) -> Join
         .map(of)
         .min_by(|a, b| a.0.total_cmp(&b.0));
     design.random_points(ROWS, seed, best.map_or(0, |b| b.1))
+}
+
+/// Energy differences between the points: true parameters against the estimate that noise left (table 5).
+fn energy_prediction(
+    design: &EnergyDesign,
+    points: &JointStates,
+    x: &[f64],
+    estimate: &[f64],
+) -> Prediction {
+    let w = design.observation_matrix(points);
+    let product = |x: &[f64]| -> Vec<f64> {
+        let row = |i| (0..w.ncols()).map(|j| w[(i, j)] * x[j]).sum();
+        (0..w.nrows()).map(row).collect()
+    };
+    Prediction {
+        training: true,
+        time: (0..w.nrows()).map(|i| i as f64).collect(),
+        measured: vec![product(x)],
+        predicted: vec![product(estimate)],
+    }
+}
+
+/// Samples along the path.
+const PATH_SAMPLES: usize = 1000;
+
+/// Torques along the path, which no energy difference of the estimate has seen.
+///
+/// The base columns of the energy model serve the torque model too: both lose the same parameters.
+fn torque_prediction(
+    robot: &Robot,
+    structure: &Structure,
+    path: &QuinticPath,
+    x: &[f64],
+    estimate: &[f64],
+) -> Prediction {
+    let times: Vec<f64> = (0..PATH_SAMPLES)
+        .map(|k| path.duration() * k as f64 / PATH_SAMPLES as f64)
+        .collect();
+    let states = path.states(&times);
+    let mut measured = vec![vec![0.0; PATH_SAMPLES]; robot.n_joints()];
+    let mut predicted = measured.clone();
+    let columns = structure.base_columns();
+    visit_rows(robot, &columns, &states, 0.0, |sample, joint, row| {
+        let product = |x: &[f64]| row.iter().zip(x).map(|(w, x)| w * x).sum();
+        measured[joint][sample] = product(x);
+        predicted[joint][sample] = product(estimate);
+    });
+    Prediction {
+        training: false,
+        time: times,
+        measured,
+        predicted,
+    }
 }

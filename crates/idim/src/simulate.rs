@@ -4,6 +4,8 @@
 //! noise of the joints from the scatter between periods.
 
 use crate::error::Error;
+use crate::identify::Prediction;
+use crate::samples::visit_rows;
 use crate::structure::{KeepOrder, Structure};
 use faer::Mat;
 use idim_estimation::{
@@ -111,6 +113,32 @@ impl Recovered {
         (error / size).sqrt()
     }
 
+    /// Averaged torques of this experiment against what `values` of the same columns predict.
+    pub fn prediction(
+        &self,
+        robot: &Robot,
+        values: &[f64],
+        times: &[f64],
+        training: bool,
+    ) -> Prediction {
+        let mut predicted = vec![vec![0.0; times.len()]; robot.n_joints()];
+        visit_rows(
+            robot,
+            &self.columns,
+            &self.states,
+            0.0,
+            |sample, joint, row| {
+                predicted[joint][sample] = row.iter().zip(values).map(|(w, x)| w * x).sum();
+            },
+        );
+        Prediction {
+            training,
+            time: times.to_vec(),
+            measured: self.torque.clone(),
+            predicted,
+        }
+    }
+
     /// For each parameter whether the truth lies inside the stated 95 % interval of the weighted estimate.
     pub fn covered(&self) -> Vec<bool> {
         let e = &self.weighted;
@@ -168,6 +196,11 @@ impl<'a> Experiment<'a> {
             friction_torque,
             standard,
         })
+    }
+
+    /// Times of the samples of one period, s.
+    pub fn times(&self) -> &[f64] {
+        &self.times
     }
 
     /// Records and identifies once; `draw` numbers the experiment under one seed.
