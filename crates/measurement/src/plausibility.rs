@@ -162,7 +162,7 @@ pub(crate) fn meaning_of_factor(factor: f64, joint: &Joint) -> (&'static str, St
     let revolute = joint.kind == JointKind::Revolute;
     let gear = joint.actuator.gear_ratio.map_or(f64::NAN, f64::abs);
     if revolute && near(degree) {
-        let text = "that is 180/π: q is in degrees; name it `q1_deg`";
+        let text = "that is 180/π: q is in degrees; give its header the suffix `_deg`";
         return ("degrees", format!("{text}{flipped}"));
     }
     if revolute && near(1.0 / degree) {
@@ -227,7 +227,7 @@ pub(crate) fn position_doubts(log: &Log, robot: &Robot) -> Vec<PositionDoubt> {
         let (low, high) = range(&log.q[j]);
         let met = format!("q from {low:.4} to {high:.4}");
         let (unit, revolute) = match joint.kind {
-            JointKind::Revolute => ("degrees (then name it `q1_deg`)", true),
+            JointKind::Revolute => ("degrees (then give its header the suffix `_deg`)", true),
             JointKind::Prismatic => ("mm (then name it `q1_mm`)", false),
         };
         let (times, rule) = if let Some(limits) = joint.limits.position {

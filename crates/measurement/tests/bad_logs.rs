@@ -210,7 +210,7 @@ fn degrees_for_radians_show_against_the_recorded_velocity() {
             "joint elbow",
             "q changes 57.29",
             "180/π",
-            "q is in degrees; name it `q1_deg`",
+            "q is in degrees; give its header the suffix `_deg`",
         ],
     );
     assert_check_says(
