@@ -47,6 +47,44 @@ pub(crate) struct Fixed {
     pub(crate) translation: [f64; 3],
 }
 
+impl Rotation {
+    /// `Rᵀ v`: a vector of the outer frame in the inner one.
+    #[inline(always)]
+    pub(crate) fn to_inner<T: Lane>(&self, v: V3<T>) -> V3<T> {
+        match *self {
+            Self::None => v,
+            Self::Quarter => [v[0], v[2], -v[1]],
+            Self::AboutX { c, s } => {
+                let (c, s) = (T::splat(c), T::splat(s));
+                [
+                    v[0],
+                    c.mul_add(v[1], s * v[2]),
+                    c.mul_add(v[2], -(s * v[1])),
+                ]
+            }
+            Self::General(r) => columns_times(&r, v),
+        }
+    }
+
+    /// `R v`: a vector of the inner frame in the outer one.
+    #[inline(always)]
+    pub(crate) fn to_outer<T: Lane>(&self, v: V3<T>) -> V3<T> {
+        match *self {
+            Self::None => v,
+            Self::Quarter => [v[0], -v[2], v[1]],
+            Self::AboutX { c, s } => {
+                let (c, s) = (T::splat(c), T::splat(s));
+                [
+                    v[0],
+                    c.mul_add(v[1], -(s * v[2])),
+                    c.mul_add(v[2], s * v[1]),
+                ]
+            }
+            Self::General(r) => rows_times(&r, v),
+        }
+    }
+}
+
 impl Fixed {
     pub(crate) fn new(pose: &Pose) -> Self {
         let r = pose.rotation.map(clean);
@@ -65,42 +103,6 @@ impl Fixed {
         Self {
             rotation,
             translation: pose.translation.into(),
-        }
-    }
-
-    /// `Rᵀ v`: a vector of the outer frame in the inner one.
-    #[inline(always)]
-    pub(crate) fn to_inner<T: Lane>(&self, v: V3<T>) -> V3<T> {
-        match self.rotation {
-            Rotation::None => v,
-            Rotation::Quarter => [v[0], v[2], -v[1]],
-            Rotation::AboutX { c, s } => {
-                let (c, s) = (T::splat(c), T::splat(s));
-                [
-                    v[0],
-                    c.mul_add(v[1], s * v[2]),
-                    c.mul_add(v[2], -(s * v[1])),
-                ]
-            }
-            Rotation::General(r) => columns_times(&r, v),
-        }
-    }
-
-    /// `R v`: a vector of the inner frame in the outer one.
-    #[inline(always)]
-    pub(crate) fn to_outer<T: Lane>(&self, v: V3<T>) -> V3<T> {
-        match self.rotation {
-            Rotation::None => v,
-            Rotation::Quarter => [v[0], -v[2], v[1]],
-            Rotation::AboutX { c, s } => {
-                let (c, s) = (T::splat(c), T::splat(s));
-                [
-                    v[0],
-                    c.mul_add(v[1], -(s * v[2])),
-                    c.mul_add(v[2], s * v[1]),
-                ]
-            }
-            Rotation::General(r) => rows_times(&r, v),
         }
     }
 
@@ -192,8 +194,8 @@ impl Offset {
 /// The link's frame in its joint's frame.
 #[derive(Debug, Clone)]
 pub(crate) enum LinkPose {
-    /// Same origin, axes along each other: link axis `axes[k].0`, times the sign, is joint axis `k`.
-    Along([(usize, f64); 3]),
+    /// Same origin, axes along each other: the link's parameter `k` is, with this sign, this one of the joint frame.
+    Along([(usize, f64); 10]),
     /// Anywhere.
     Posed {
         rotation: [[f64; 3]; 3],
@@ -213,7 +215,7 @@ impl LinkPose {
         if pose.translation.iter().all(|&x| x == 0.0)
             && let (Some(x), Some(y), Some(z)) = (signed(0), signed(1), signed(2))
         {
-            return Self::Along([x, y, z]);
+            return Self::Along(permutation([x, y, z]));
         }
         Self::Posed {
             rotation: rows(&r),
@@ -247,24 +249,28 @@ impl LinkPose {
     ///
     /// The parameter's own place for a link that is not along its joint's axes.
     pub(crate) fn entry(&self, k: usize) -> (usize, f64) {
-        let Self::Along(axes) = self else {
-            return (k, 1.0);
-        };
-        // Link axis j is joint axis `to[j]`.
-        let mut to = [(0, 1.0); 3];
-        for (k, &(j, sign)) in axes.iter().enumerate() {
-            to[j] = (k, sign);
-        }
-        match k {
-            0..6 => {
-                let [i, j] = TENSOR[k];
-                let place = TENSOR_PLACE[to[i].0][to[j].0];
-                (place, to[i].1 * to[j].1)
-            }
-            6..9 => (6 + to[k - 6].0, to[k - 6].1),
-            _ => (9, 1.0),
+        match self {
+            Self::Along(entries) => entries[k],
+            Self::Posed { .. } => (k, 1.0),
         }
     }
+}
+
+/// Where the ten parameters go when link axis `axes[k].0`, times the sign, is joint axis `k`.
+fn permutation(axes: [(usize, f64); 3]) -> [(usize, f64); 10] {
+    // Link axis j is joint axis `to[j]`.
+    let mut to = [(0, 1.0); 3];
+    for (k, &(j, sign)) in axes.iter().enumerate() {
+        to[j] = (k, sign);
+    }
+    std::array::from_fn(|k| match k {
+        0..6 => {
+            let [i, j] = TENSOR[k];
+            (TENSOR_PLACE[to[i].0][to[j].0], to[i].1 * to[j].1)
+        }
+        6..9 => (6 + to[k - 6].0, to[k - 6].1),
+        _ => (9, 1.0),
+    })
 }
 
 /// Row and column of the tensor for each of the six.

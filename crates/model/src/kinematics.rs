@@ -61,13 +61,13 @@ impl<T: Lane> Travel<T> {
     /// A vector of the joint below's frame in this joint's.
     #[inline(always)]
     pub(crate) fn into_joint(self, joint: &KernelJoint, v: V3<T>) -> V3<T> {
-        self.to_inner(joint.step.to_inner(v))
+        self.to_inner(joint.step.rotation.to_inner(v))
     }
 
     /// A vector of this joint's frame in that of the joint below.
     #[inline(always)]
     pub(crate) fn out_of_joint(self, joint: &KernelJoint, v: V3<T>) -> V3<T> {
-        joint.step.to_outer(self.to_outer(v))
+        joint.step.rotation.to_outer(self.to_outer(v))
     }
 
     /// `R v`.

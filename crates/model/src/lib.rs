@@ -64,7 +64,7 @@ pub use parameter::{
 };
 pub use pose::{Pose, SNAP_ANGLE, exact_sin_cos, snap_angle};
 pub use regressor::{
-    RegressorBlock, RegressorWorkspace, observation_matrix, torque_regressor,
+    BlockFiller, RegressorBlock, RegressorWorkspace, observation_matrix, torque_regressor,
     torque_regressor_into, visit_torque_regressor,
 };
 pub use robot::{Actuator, Joint, JointKind, JointLimits, Link, Robot};

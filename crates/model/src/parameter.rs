@@ -152,7 +152,8 @@ impl ParameterKind {
 
     /// Position within the ten inertial parameters, `None` for a drive's parameter.
     pub fn inertial_index(self) -> Option<usize> {
-        Self::INERTIAL.iter().position(|&k| k == self)
+        // The inertial kinds come first, in the order of `INERTIAL`.
+        Some(self as usize).filter(|&k| k < Self::INERTIAL.len())
     }
 
     /// SI unit of the parameter for a revolute joint.

@@ -43,16 +43,27 @@ pub(crate) struct LinkPlan {
     column: [usize; 10],
 }
 
+/// All ten entries of a link.
+const ALL: u16 = 0b11_1111_1111;
+/// What the base columns of a link in the middle of an arm most often are: no mass, no moment along the axis, and of
+/// the tensor's entries across the axis only one.
+const BASE_XX: u16 = 0b00_1111_0111;
+/// The same with the other entry.
+const BASE_YY: u16 = 0b00_1111_1110;
+/// Any set: look it up.
+const ASK: u16 = 0;
+
 impl LinkPlan {
     #[inline(always)]
     pub(crate) fn is_empty(&self) -> bool {
         self.wanted == 0
     }
 
-    /// Whether entry `k` is asked for.
+    /// Whether entry `k` is asked for; `WANTED` answers at compile time unless it is [`ASK`].
     #[inline(always)]
-    fn wants(&self, k: usize) -> bool {
-        self.wanted >> k & 1 == 1
+    fn wants<const WANTED: u16>(&self, k: usize) -> bool {
+        let wanted = if WANTED == ASK { self.wanted } else { WANTED };
+        wanted >> k & 1 == 1
     }
 
     /// Writes entry `k`, which is asked for, to its column of a row.
@@ -68,7 +79,7 @@ impl LinkPlan {
     /// Entry `k` from its column of a row, zero where it was not asked for.
     #[inline(always)]
     pub(crate) fn get<T: Lane>(&self, k: usize, row: &[T]) -> T {
-        match (self.wants(k), self.negated >> k & 1 == 1) {
+        match (self.wants::<ASK>(k), self.negated >> k & 1 == 1) {
             (false, _) => T::splat(0.0),
             (true, false) => row[self.column[k]],
             (true, true) => -row[self.column[k]],
@@ -154,40 +165,69 @@ impl<T: Lane> Kinematics<T> {
         }
     }
 
+    /// Takes link `j` from the link below: its motion and the axes on its path.
+    #[inline(always)]
+    fn go_out(&mut self, model: &Model, j: usize, [q, qd, qdd]: [T; 3]) -> WrenchMap<T> {
+        // The same lines for every step, compiled once for each simple one.
+        match (
+            model.joints[j].step.rotation,
+            Travel::new(&model.joints[j], q),
+        ) {
+            (Rotation::Quarter, Travel::Turn { s, c }) => {
+                let step = (Rotation::Quarter, Travel::Turn { s, c });
+                self.carry_axes(model, j, step);
+                self.move_link(model, j, step, qd, qdd)
+            }
+            (Rotation::None, Travel::Turn { s, c }) => {
+                let step = (Rotation::None, Travel::Turn { s, c });
+                self.carry_axes(model, j, step);
+                self.move_link(model, j, step, qd, qdd)
+            }
+            step => {
+                self.carry_axes(model, j, step);
+                self.move_link(model, j, step, qd, qdd)
+            }
+        }
+    }
+
     /// Motion of link `j` about its joint's frame, and what it does at the joints the link carries.
     #[inline(always)]
     fn move_link(
         &mut self,
         model: &Model,
         j: usize,
-        travel: Travel<T>,
+        step: (Rotation, Travel<T>),
         qd: T,
         qdd: T,
     ) -> WrenchMap<T> {
         let joint = &model.joints[j];
+        let below = &self.motion[j];
         let carried = match joint.parent {
             None => {
-                let up = joint.step.to_inner(minus(model.gravity));
-                let a = splat(up);
+                let up = joint.step.rotation.to_inner(minus(model.gravity));
                 let vertical = up[0] == 0.0 && up[1] == 0.0;
+                let a = splat(up);
                 LinkMotion {
                     w: zero(),
                     wd: zero(),
-                    a: if vertical { a } else { travel.to_inner(a) },
+                    a: if vertical { a } else { step.1.to_inner(a) },
                 }
             }
             Some(p) if model.joints[p].planar => {
-                let below = &self.motion[j];
-                let z = z_beyond(joint, travel);
+                let z = z_beyond(step);
                 LinkMotion {
                     w: times(below.w[2], z),
                     wd: times(below.wd[2], z),
-                    a: travel.into_joint(joint, below.a),
+                    a: into_joint(step, below.a),
                 }
             }
-            Some(_) => self.motion[j].turned(joint, travel),
+            Some(_) => LinkMotion {
+                w: into_joint(step, below.w),
+                wd: into_joint(step, below.wd),
+                a: into_joint(step, below.a),
+            },
         };
-        let motion = carried.moved(travel, qd, qdd);
+        let motion = carried.moved(step.1, qd, qdd);
         let map = if joint.planar {
             WrenchMap::planar(&motion)
         } else {
@@ -204,42 +244,52 @@ impl<T: Lane> Kinematics<T> {
 
     /// Carries the axes of the link below out to link `j`.
     #[inline(always)]
-    fn carry_axes(&mut self, model: &Model, j: usize, travel: Travel<T>) {
+    fn carry_axes(&mut self, model: &Model, j: usize, step: (Rotation, Travel<T>)) {
         let joint = &model.joints[j];
         let Some(p) = joint.parent else { return };
-        let (n, step) = (self.n, &joint.step);
+        let n = self.n;
+        let p_from = joint.step.translation;
         let below = &model.joints[p].directions;
+        let (inner, outer) = self.direction.split_at_mut(j * n);
+        let (inner_linear, outer_linear) = self.linear.split_at_mut(j * n);
+        let (directions, linears) = (&inner[p * n..][..n], &inner_linear[p * n..][..n]);
+        let (out, out_linear) = (&mut outer[..n], &mut outer_linear[..n]);
         for d in below {
             let own_of_below = d.index + 1 == below.len();
             let stays = d.index + 1 == joint.directions.len();
-            let outside = self.direction[p * n + d.index];
+            let outside = directions[d.index];
             let direction = match (stays, own_of_below) {
                 (true, _) => z_axis(),
-                (false, true) => z_beyond(joint, travel),
-                (false, false) => travel.into_joint(joint, outside),
+                (false, true) => z_beyond(step),
+                (false, false) => into_joint(step, outside),
             };
             if !stays {
-                self.direction[j * n + d.index] = direction;
+                out[d.index] = direction;
             }
             if d.kind == JointKind::Prismatic {
                 continue;
             }
             for &i in &joint.path[d.range.clone()] {
-                let linear = self.linear[p * n + i];
                 let shifted = if own_of_below {
-                    shift_about_z(step.translation, linear)
+                    shift_about_z(p_from, linears[i])
                 } else {
-                    shift(step.translation, linear, outside)
+                    shift(p_from, linears[i], outside)
                 };
-                let mut linear = travel.into_joint(joint, shifted);
-                if let Travel::Slide { d } = travel {
+                let mut linear = into_joint(step, shifted);
+                if let Travel::Slide { d } = step.1 {
                     linear[0] = direction[1].mul_add(d, linear[0]);
                     linear[1] = (-direction[0]).mul_add(d, linear[1]);
                 }
-                self.linear[j * n + i] = linear;
+                out_linear[i] = linear;
             }
         }
     }
+}
+
+/// A vector of the joint below's frame in a joint's.
+#[inline(always)]
+fn into_joint<T: Lane>((rotation, travel): (Rotation, Travel<T>), v: V3<T>) -> V3<T> {
+    travel.to_inner(rotation.to_inner(v))
 }
 
 #[inline(always)]
@@ -249,10 +299,10 @@ fn z_axis<T: Lane>() -> V3<T> {
 
 /// The axis of the joint below in the frame of a joint.
 #[inline(always)]
-fn z_beyond<T: Lane>(joint: &KernelJoint, travel: Travel<T>) -> V3<T> {
-    match (joint.step.rotation, travel) {
+fn z_beyond<T: Lane>(step: (Rotation, Travel<T>)) -> V3<T> {
+    match step {
         (Rotation::Quarter, Travel::Turn { s, c }) => [s, c, T::splat(0.0)],
-        _ => travel.into_joint(joint, z_axis()),
+        _ => into_joint(step, z_axis()),
     }
 }
 
@@ -273,30 +323,10 @@ pub(crate) fn fill<T: Lane>(
 ) {
     let p = plan.n_columns;
     for (j, joint) in model.joints.iter().enumerate() {
-        let travel = Travel::new(joint, q[j]);
-        let map = kinematics.move_link(model, j, travel, qd[j], qdd[j]);
-        kinematics.carry_axes(model, j, travel);
+        let map = kinematics.go_out(model, j, [q[j], qd[j], qdd[j]]);
         let link = &plan.links[j];
         if !link.is_empty() {
-            match &joint.link {
-                LinkPose::Along(_) => project_along(joint, j, &map, kinematics, link, p, rows),
-                LinkPose::Posed {
-                    rotation,
-                    translation,
-                    ..
-                } => {
-                    project_posed(
-                        joint,
-                        j,
-                        &map,
-                        (rotation, *translation),
-                        kinematics,
-                        link,
-                        p,
-                        rows,
-                    );
-                }
-            }
+            project(joint, j, &map, kinematics, link, p, rows);
         }
         for &(kind, column) in &plan.drives[j] {
             rows[j * p + column] = match kind {
@@ -314,9 +344,9 @@ pub(crate) fn fill<T: Lane>(
     }
 }
 
-/// Rows of a link whose axes are along those of its joint's frame.
+/// The rows' entries for the columns of a link.
 #[inline(always)]
-fn project_along<T: Lane>(
+fn project<T: Lane>(
     joint: &KernelJoint,
     j: usize,
     map: &WrenchMap<T>,
@@ -325,27 +355,56 @@ fn project_along<T: Lane>(
     p: usize,
     rows: &mut [T],
 ) {
+    let at = (j, link, p);
+    match (&joint.link, link.wanted) {
+        (
+            LinkPose::Posed {
+                rotation,
+                translation,
+                ..
+            },
+            _,
+        ) => {
+            project_posed(joint, at, map, (rotation, *translation), kinematics, rows);
+        }
+        (_, BASE_XX) => project_along::<T, BASE_XX>(joint, at, map, kinematics, rows),
+        (_, BASE_YY) => project_along::<T, BASE_YY>(joint, at, map, kinematics, rows),
+        (_, ALL) => project_along::<T, ALL>(joint, at, map, kinematics, rows),
+        _ => project_along::<T, ASK>(joint, at, map, kinematics, rows),
+    }
+}
+
+/// Rows of a link whose axes are along those of its joint's frame.
+#[inline(always)]
+fn project_along<T: Lane, const WANTED: u16>(
+    joint: &KernelJoint,
+    (j, link, p): (usize, &LinkPlan, usize),
+    map: &WrenchMap<T>,
+    kinematics: &Kinematics<T>,
+    rows: &mut [T],
+) {
     let n = kinematics.n;
+    let linear = &kinematics.linear[j * n..][..n];
+    let direction = &kinematics.direction[j * n..][..n];
     for d in &joint.directions {
-        let v = kinematics.direction[j * n + d.index];
+        let v = direction[d.index];
         let joints = &joint.path[d.range.clone()];
-        let linear = &kinematics.linear[j * n..][..n];
         let own = d.index + 1 == joint.directions.len();
         match (d.kind, own, d.across) {
             (JointKind::Prismatic, _, _) => {
                 let row = &mut rows[joints[0] * p..][..p];
                 for k in 6..10 {
-                    if link.wants(k) {
+                    if link.wants::<WANTED>(k) {
                         link.put(k, row, map.force_entry(k, v));
                     }
                 }
             }
             (_, true, _) => {
                 let below = &joints[..joints.len() - 1];
-                project_direction::<T, ABOUT_Z>(below, v, linear, map, link, p, rows);
+                project_direction::<T, ABOUT_Z, WANTED>(below, v, linear, map, (link, p), rows);
                 let row = &mut rows[j * p..][..p];
                 for k in 0..8 {
-                    if link.wants(k) {
+                    if link.wants::<WANTED>(k) {
                         let entry = if k < 6 {
                             map.tensor_entry::<ABOUT_Z>(k, v)
                         } else {
@@ -355,36 +414,41 @@ fn project_along<T: Lane>(
                     }
                 }
             }
-            (_, _, true) => project_direction::<T, ACROSS>(joints, v, linear, map, link, p, rows),
-            _ => project_direction::<T, ANY>(joints, v, linear, map, link, p, rows),
+            (_, _, true) => {
+                project_direction::<T, ACROSS, WANTED>(joints, v, linear, map, (link, p), rows);
+            }
+            _ => project_direction::<T, ANY, WANTED>(joints, v, linear, map, (link, p), rows),
         }
     }
 }
 
 /// Rows of parallel revolute joints: what the tensor's columns say is the same in all of them.
 #[inline(always)]
-fn project_direction<T: Lane, const FORM: u8>(
+fn project_direction<T: Lane, const FORM: u8, const WANTED: u16>(
     joints: &[usize],
     v: V3<T>,
     linear: &[V3<T>],
     map: &WrenchMap<T>,
-    link: &LinkPlan,
-    p: usize,
+    (link, p): (&LinkPlan, usize),
     rows: &mut [T],
 ) {
+    let mut tensor = [T::splat(0.0); 6];
     for k in 0..6 {
-        if link.wants(k) {
-            let entry = map.tensor_entry::<FORM>(k, v);
-            for &i in joints {
-                link.put(k, &mut rows[i * p..][..p], entry);
-            }
+        if link.wants::<WANTED>(k) {
+            tensor[k] = map.tensor_entry::<FORM>(k, v);
         }
     }
     for &i in joints {
         let row = &mut rows[i * p..][..p];
-        for k in 6..10 {
-            if link.wants(k) {
-                link.put(k, row, map.moment_entry::<FORM>(k, v, linear[i]));
+        let f = linear[i];
+        for k in 0..10 {
+            if link.wants::<WANTED>(k) {
+                let entry = if k < 6 {
+                    tensor[k]
+                } else {
+                    map.moment_entry::<FORM>(k, v, f)
+                };
+                link.put(k, row, entry);
             }
         }
     }
@@ -394,12 +458,10 @@ fn project_direction<T: Lane, const FORM: u8>(
 #[inline(always)]
 fn project_posed<T: Lane>(
     joint: &KernelJoint,
-    j: usize,
+    (j, link, p): (usize, &LinkPlan, usize),
     map: &WrenchMap<T>,
     (rotation, translation): (&[[f64; 3]; 3], [f64; 3]),
     kinematics: &Kinematics<T>,
-    link: &LinkPlan,
-    p: usize,
     rows: &mut [T],
 ) {
     let map = WrenchMap::new(&map.motion_at(rotation, translation));
@@ -408,7 +470,7 @@ fn project_posed<T: Lane>(
             let axis = kinematics.axis(j, d, i).at(rotation, translation);
             let row = &mut rows[i * p..][..p];
             for k in 0..10 {
-                if link.wants(k) {
+                if link.wants::<ASK>(k) {
                     let entry = if k < 6 {
                         map.tensor_entry::<ANY>(k, axis.angular)
                     } else {

@@ -185,21 +185,61 @@ pub fn visit_torque_regressor(
         n,
         "the states have another number of joints than the model"
     );
-    let plan = Plan::new(model, columns);
-    let mut lanes = LaneStates::new(n);
-    let mut kinematics = Kinematics::new(model);
-    let mut block = RegressorBlock::new(n, columns.len());
+    let mut filler = BlockFiller::new(model, columns);
+    let mut block = filler.block();
     for first in (0..states.n_samples()).step_by(RegressorBlock::LANES) {
+        filler.fill(model, states, first, &mut block);
+        visit(&block);
+    }
+}
+
+/// Fills blocks of the regressor one by one, for a reader that keeps several of them.
+#[derive(Debug, Clone)]
+pub struct BlockFiller {
+    plan: Plan,
+    lanes: LaneStates,
+    kinematics: Kinematics<F64x8>,
+}
+
+impl BlockFiller {
+    /// For a model and the columns wanted.
+    ///
+    /// # Panics
+    /// If a column does not fit the model.
+    #[track_caller]
+    pub fn new(model: &Model, columns: &Columns) -> Self {
+        Self {
+            plan: Plan::new(model, columns),
+            lanes: LaneStates::new(model.n_joints()),
+            kinematics: Kinematics::new(model),
+        }
+    }
+
+    /// A block of the right shape, all zero. Only [`Self::fill`] of this filler's columns may write to it.
+    pub fn block(&self) -> RegressorBlock {
+        RegressorBlock::new(self.plan.links.len(), self.plan.n_columns)
+    }
+
+    /// Writes the regressor of the samples from `first` on.
+    ///
+    /// # Panics
+    /// If the states do not fit the model or have no sample `first`.
+    pub fn fill(
+        &mut self,
+        model: &Model,
+        states: &JointStates,
+        first: usize,
+        block: &mut RegressorBlock,
+    ) {
         block.move_to(first, states.n_samples());
-        lanes.load(states, first);
+        self.lanes.load(states, first);
         dispatch(Fill {
             model,
-            plan: &plan,
-            state: lanes.state(),
-            kinematics: &mut kinematics,
+            plan: &self.plan,
+            state: self.lanes.state(),
+            kinematics: &mut self.kinematics,
             rows: &mut block.entries,
         });
-        visit(&block);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Joint states: one, and many.
 
-use crate::lane::{F64x8, Lane};
+use crate::lane::{F64x8, Lane, dispatch};
 use crate::robot::Robot;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -158,6 +158,7 @@ impl JointStates {
 }
 
 /// Eight samples of every joint, the last sample repeated where there are fewer.
+#[derive(Debug, Clone)]
 pub(crate) struct LaneStates {
     q: Vec<F64x8>,
     qd: Vec<F64x8>,
@@ -180,19 +181,44 @@ impl LaneStates {
     }
 
     pub(crate) fn load(&mut self, states: &JointStates, first: usize) {
-        for j in 0..states.n_joints() {
-            self.q[j] = eight(states.q(j), first);
-            self.qd[j] = eight(states.qd(j), first);
-            self.qdd[j] = eight(states.qdd(j), first);
+        dispatch(Load {
+            lanes: self,
+            states,
+            first,
+        });
+    }
+}
+
+/// Written with the registers the kernels read with: a wide read of narrow writes has to wait.
+struct Load<'a> {
+    lanes: &'a mut LaneStates,
+    states: &'a JointStates,
+    first: usize,
+}
+
+impl pulp::WithSimd for Load<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        for j in 0..self.states.n_joints() {
+            self.lanes.q[j] = eight(self.states.q(j), self.first);
+            self.lanes.qd[j] = eight(self.states.qd(j), self.first);
+            self.lanes.qdd[j] = eight(self.states.qdd(j), self.first);
         }
     }
 }
 
+/// Eight consecutive numbers, the last one repeated where there are fewer.
+#[inline(always)]
 pub(crate) fn eight(x: &[f64], first: usize) -> F64x8 {
-    if let Some(full) = x[first..].first_chunk::<8>() {
+    let rest = &x[first..];
+    if let Some(full) = rest.first_chunk::<8>() {
         return F64x8::new(*full);
     }
-    F64x8::new(std::array::from_fn(|k| x[(first + k).min(x.len() - 1)]))
+    let mut few = [rest[rest.len() - 1]; 8];
+    few[..rest.len()].copy_from_slice(rest);
+    F64x8::new(few)
 }
 
 /// Span of a prismatic joint (m) drawn from where the robot states no position limits.
