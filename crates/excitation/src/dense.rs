@@ -1,30 +1,18 @@
-//! Small symmetric matrices, row by row in slices: what a design of a few dozen rows needs in a microsecond.
-
-/// `WᵀW` of rows of length `n`, both triangles.
-pub(crate) fn gram(rows: &[f64], n: usize, out: &mut [f64]) {
-    out.fill(0.0);
-    for row in rows.chunks_exact(n) {
-        for (i, &wi) in row.iter().enumerate() {
-            for (a, &wj) in out[i * n..=i * n + i].iter_mut().zip(row) {
-                *a += wi * wj;
-            }
-        }
-    }
-    for i in 0..n {
-        for j in 0..i {
-            out[j * n + i] = out[i * n + j];
-        }
-    }
-}
+//! Inner products in a fixed order, and the Cholesky factor of a matrix kept row by row.
 
 /// Lower Cholesky factor over the lower triangle; `false` when `a` is not positive definite.
 pub(crate) fn cholesky(a: &mut [f64], n: usize) -> bool {
+    cholesky_strided(a, n, n)
+}
+
+/// The same for rows `stride` apart.
+#[inline(always)]
+pub(crate) fn cholesky_strided(a: &mut [f64], n: usize, stride: usize) -> bool {
     for i in 0..n {
-        let (above, row) = a.split_at_mut(i * n);
+        let (above, row) = a.split_at_mut(i * stride);
         for j in 0..i {
-            let other = &above[j * n..j * n + j];
-            let dot = dot(&row[..j], other);
-            row[j] = (row[j] - dot) / above[j * n + j];
+            let other = &above[j * stride..][..=j];
+            row[j] = (row[j] - dot(&row[..j], &other[..j])) / other[j];
         }
         let d = row[i] - dot(&row[..i], &row[..i]);
         if d.is_nan() || d <= 0.0 {
@@ -35,35 +23,14 @@ pub(crate) fn cholesky(a: &mut [f64], n: usize) -> bool {
     true
 }
 
-/// `A⁻¹` from the lower factor, both triangles; `scratch` takes the inverse of the factor.
-pub(crate) fn inverse_of_factor(l: &[f64], n: usize, scratch: &mut [f64], out: &mut [f64]) {
-    // Row i of L⁻¹ is -(Σ_{k<i} l_ik row_k) / l_ii, with 1 / l_ii on the diagonal.
-    for i in 0..n {
-        let (above, row) = scratch.split_at_mut(i * n);
-        let row = &mut row[..n];
-        row.fill(0.0);
-        for k in 0..i {
-            let factor = l[i * n + k];
-            for (r, &a) in row.iter_mut().zip(&above[k * n..=k * n + k]) {
-                *r -= factor * a;
-            }
-        }
-        let inverse = 1.0 / l[i * n + i];
-        for r in &mut row[..i] {
-            *r *= inverse;
-        }
-        row[i] = inverse;
-    }
-    // A⁻¹ = L⁻ᵀ L⁻¹ is the Gram matrix of the rows of L⁻¹.
-    gram(&scratch[..n * n], n, out);
-}
-
 /// Sum of squares.
+#[inline(always)]
 pub(crate) fn norm_squared(a: &[f64]) -> f64 {
     dot(a, a)
 }
 
 /// Inner product in four fixed lanes, so that it vectorises and always sums in the same order.
+#[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));

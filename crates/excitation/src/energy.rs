@@ -9,48 +9,49 @@ use nalgebra::{Matrix3, Vector3};
 
 /// What one joint contributes, with its axis turned onto z.
 #[derive(Debug, Clone)]
-struct EnergyJoint {
-    parent: Option<usize>,
-    kind: JointKind,
-    offset: f64,
-    before: Step,
+pub(crate) struct EnergyJoint {
+    pub(crate) parent: Option<usize>,
+    pub(crate) kind: JointKind,
+    pub(crate) offset: f64,
+    pub(crate) before: Step,
     /// `None` where the link's frame is the moved joint frame (modified DH).
-    after: Option<Step>,
+    pub(crate) after: Option<Step>,
 }
 
 /// A constant change of frame, `to_from_here`, origin of the new frame seen from here.
 #[derive(Debug, Clone)]
-struct Step {
-    rotation: Matrix3<f64>,
-    origin: Vector3<f64>,
+pub(crate) struct Step {
+    pub(crate) rotation: Matrix3<f64>,
+    pub(crate) origin: Vector3<f64>,
 }
 
 /// What travels along the chain, in the axes of the link: angular velocity, velocity of the origin, gravity, and
 /// gravity times the position of the origin.
 #[derive(Debug, Clone, Copy, Default)]
-struct Motion {
-    w: Vector3<f64>,
-    v: Vector3<f64>,
-    g: Vector3<f64>,
-    height: f64,
+pub(crate) struct Motion {
+    pub(crate) w: Vector3<f64>,
+    pub(crate) v: Vector3<f64>,
+    pub(crate) g: Vector3<f64>,
+    pub(crate) height: f64,
 }
 
 /// The energy model of a robot for a choice of columns: `H = h(q, q̇) X`.
 #[derive(Debug, Clone)]
 pub(crate) struct EnergyModel {
-    joints: Vec<EnergyJoint>,
+    pub(crate) joints: Vec<EnergyJoint>,
     gravity: Vector3<f64>,
     /// Of each link: (column, which of the ten).
-    entries: Vec<Vec<(usize, usize)>>,
+    pub(crate) entries: Vec<Vec<(usize, usize)>>,
     n_columns: usize,
 }
 
 /// Scratch of one evaluation: the motion of every link, and of every joint frame after the joint moved.
 #[derive(Debug, Clone)]
 pub(crate) struct EnergyScratch {
-    links: Vec<Motion>,
-    moved: Vec<Motion>,
-    sin_cos: Vec<(f64, f64)>,
+    pub(crate) links: Vec<Motion>,
+    pub(crate) moved: Vec<Motion>,
+    pub(crate) sin_cos: Vec<(f64, f64)>,
+    pub(crate) adjoint: Vec<Motion>,
 }
 
 impl EnergyModel {
@@ -101,6 +102,7 @@ impl EnergyModel {
             links: vec![Motion::default(); n],
             moved: vec![Motion::default(); n],
             sin_cos: vec![(0.0, 1.0); n],
+            adjoint: vec![Motion::default(); n],
         }
     }
 

@@ -9,6 +9,7 @@
 //! and the volume of their uncertainty by `det (WᵀW)⁻¹`. This crate measures both ([`Conditioning`], [`Criterion`])
 //! and finds motions that make them small:
 //! - [`optimise_points_powell`]: chained points `(q, q̇)` of the energy model, as Gautier & Khalil do;
+//! - [`search_points`]: the same by exact gradients and many starts, far below what Powell's method reaches;
 //! - [`optimise_fourier`]: a periodic motion of the torque model inside certified limits, as Radkhah, Kulić & Croft do.
 //!
 //! ```
@@ -29,9 +30,11 @@
 //! Not here: which columns are independent (`idim-base-params`), families of motion and their limits
 //! (`idim-trajectory`), estimation.
 
+mod box_lbfgs;
 mod criterion;
 mod dense;
 mod energy;
+mod energy_gradient;
 mod error;
 mod fourier;
 mod fourier_interior;
@@ -39,10 +42,17 @@ mod fourier_limits;
 mod fourier_objective;
 mod fourier_search;
 mod information;
+mod padded;
+mod point_moves;
+mod point_objective;
+mod point_rows;
+mod point_schedule;
 mod points;
 mod points_powell;
+mod points_search;
 mod powell;
 mod random_condition;
+mod schatten;
 mod spectrum;
 
 pub use criterion::{ConditionNumbers, Conditioning, Criterion, Equilibrium, Scaling};
@@ -51,5 +61,6 @@ pub use fourier::{FourierDesign, FourierOptions, optimise_fourier, series_condit
 pub use information::information_matrix;
 pub use points::{EnergyDesign, PointLimits};
 pub use points_powell::{PointDesign, PowellPointOptions, optimise_points_powell};
+pub use points_search::{PointSearchOptions, SearchProgress, search_points};
 pub use powell::{PowellOptions, PowellOutcome, powell};
 pub use random_condition::{ConditionStatistics, random_condition_statistics};

@@ -99,6 +99,12 @@ impl EnergyDesign {
         self.positions.len() + self.n_joints()
     }
 
+    /// Lowest and highest value of each design variable of a point.
+    pub(crate) fn ranges(&self) -> impl Iterator<Item = [f64; 2]> {
+        let positions = self.positions.iter().map(|&j| self.limits.position[j]);
+        positions.chain(self.limits.velocity.iter().map(|&v| [-v, v]))
+    }
+
     pub(crate) fn model(&self) -> &EnergyModel {
         &self.model
     }

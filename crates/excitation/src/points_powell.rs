@@ -1,11 +1,9 @@
 //! Points for the energy model as the paper finds them: substitutions, Powell's method, random starts.
 
 use crate::criterion::Criterion;
-use crate::dense;
-use crate::energy::EnergyScratch;
+use crate::point_rows::PointRows;
 use crate::powell::{PowellOptions, powell};
-use crate::{Conditioning, EnergyDesign, Scaling};
-use faer::Mat;
+use crate::{Conditioning, EnergyDesign, Scaling, dense, padded};
 use idim_model::JointStates;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -34,7 +32,8 @@ pub struct PointDesign {
     pub points: JointStates,
     /// Every criterion of the chain.
     pub conditioning: Conditioning,
-    /// Value of the criterion after every start, in the order of the starts.
+    /// Value of the criterion after every start of Powell's method, in their order; of the best few of a search, best
+    /// first.
     pub values: Vec<f64>,
     /// 2-norm condition number (raw) before every start.
     pub initial_conditions: Vec<f64>,
@@ -93,7 +92,7 @@ impl Run {
     fn new(design: &EnergyDesign, options: &PowellPointOptions, start: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
         rng.set_stream(start);
-        let mut objective = PointObjective::new(design, options.n_rows, options.criterion);
+        let mut objective = PowellObjective::new(design, options.n_rows, options.criterion);
         let n = (options.n_rows + 1) * design.n_variables();
         // A start whose W is rank deficient to rounding is drawn again.
         let x = loop {
@@ -102,8 +101,8 @@ impl Run {
                 break x;
             }
         };
-        let initial_condition =
-            Criterion::TwoNorm(Scaling::Raw).evaluate(objective.rows().as_ref(), options.n_rows);
+        let initial_condition = Criterion::TwoNorm(Scaling::Raw)
+            .evaluate(objective.rows.matrix().as_ref(), options.n_rows);
         let outcome = powell(|x| objective.log_value(x), &x, &options.powell);
         Self {
             value: options.criterion.value_of_logarithm(outcome.value),
@@ -115,93 +114,56 @@ impl Run {
 }
 
 /// A criterion as a function of the free variables `x`, without allocation for the Frobenius condition.
-struct PointObjective<'a> {
+struct PowellObjective<'a> {
     design: &'a EnergyDesign,
     criterion: Criterion,
     n_rows: usize,
-    /// Variables of the last evaluation: a point that did not move keeps its row.
-    last: Vec<f64>,
     values: Vec<f64>,
-    scratch: EnergyScratch,
-    h: Vec<f64>,
-    w: Vec<f64>,
+    rows: PointRows<'a>,
     gram: Vec<f64>,
     work: [Vec<f64>; 2],
-    q: Vec<f64>,
 }
 
-impl<'a> PointObjective<'a> {
+impl<'a> PowellObjective<'a> {
     fn new(design: &'a EnergyDesign, n_rows: usize, criterion: Criterion) -> Self {
         let (n, b) = (design.n_variables() * (n_rows + 1), design.n_columns());
         Self {
             design,
             criterion,
             n_rows,
-            last: vec![f64::NAN; n],
             values: vec![0.0; n],
-            scratch: design.model().scratch(),
-            h: vec![0.0; (n_rows + 1) * b],
-            w: vec![0.0; n_rows * b],
-            gram: vec![0.0; b * b],
-            work: [vec![0.0; b * b], vec![0.0; b * b]],
-            // Positions that do not matter stay at zero.
-            q: vec![0.0; design.n_joints()],
+            rows: PointRows::new(design, n_rows),
+            gram: vec![0.0; b * padded::stride(b)],
+            work: [
+                vec![0.0; b * padded::stride(b)],
+                vec![0.0; b * padded::stride(b)],
+            ],
         }
     }
 
     /// Logarithm of the criterion as [`Criterion::logarithm`] has it.
     fn log_value(&mut self, x: &[f64]) -> f64 {
-        self.update_rows(x);
+        self.design.substitute(x, &mut self.values);
+        self.rows.update(&self.values);
         match self.criterion {
             Criterion::Frobenius(Scaling::Raw) => self.log_frobenius(),
-            criterion => criterion.logarithm(self.evaluate()),
-        }
-    }
-
-    fn evaluate(&self) -> f64 {
-        self.criterion.evaluate(self.rows().as_ref(), self.n_rows)
-    }
-
-    fn rows(&self) -> Mat<f64> {
-        let b = self.design.n_columns();
-        Mat::from_fn(self.n_rows, b, |i, j| self.w[i * b + j])
-    }
-
-    fn update_rows(&mut self, x: &[f64]) {
-        let (n, b) = (self.design.n_variables(), self.design.n_columns());
-        let m = self.design.position_variables().len();
-        for point in 0..=self.n_rows {
-            let range = point * n..(point + 1) * n;
-            let here = &x[range.clone()];
-            if self.last[range.clone()] == *here {
-                continue;
+            criterion => {
+                let w = self.rows.matrix();
+                criterion.logarithm(criterion.evaluate(w.as_ref(), self.n_rows))
             }
-            self.last[range.clone()].copy_from_slice(here);
-            let values = &mut self.values[range];
-            self.design.substitute(here, values);
-            for (k, &j) in self.design.position_variables().iter().enumerate() {
-                self.q[j] = values[k];
-            }
-            let h = &mut self.h[point * b..(point + 1) * b];
-            self.design
-                .model()
-                .row(&self.q, &values[m..], &mut self.scratch, h);
-        }
-        for (i, w) in self.w.iter_mut().enumerate() {
-            *w = self.h[i + b] - self.h[i];
         }
     }
 
     /// `log (‖A‖_F ‖A⁻¹‖_F)`; infinite when `A` is not positive definite to rounding.
     fn log_frobenius(&mut self) -> f64 {
         let b = self.design.n_columns();
-        dense::gram(&self.w, b, &mut self.gram);
+        padded::gram(self.rows.w(), b, &mut self.gram);
         let direct = dense::norm_squared(&self.gram);
-        if !dense::cholesky(&mut self.gram, b) {
+        if !padded::cholesky(&mut self.gram, b) {
             return f64::INFINITY;
         }
         let [inverse_factor, inverse] = &mut self.work;
-        dense::inverse_of_factor(&self.gram, b, inverse_factor, inverse);
+        padded::inverse_of_factor(&self.gram, b, inverse_factor, inverse);
         0.5 * (direct.ln() + dense::norm_squared(inverse).ln())
     }
 }

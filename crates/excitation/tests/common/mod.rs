@@ -1,6 +1,7 @@
 //! The arm of Gautier & Khalil and its inferred limits.
 
-#![allow(clippy::unwrap_used)]
+// Each test file uses a part.
+#![allow(clippy::unwrap_used, dead_code)]
 
 use idim_excitation::{EnergyDesign, PointLimits};
 use idim_model::ParameterKind::{MX, MY, XX, XY, XZ, YZ, ZZ};
