@@ -270,7 +270,16 @@ mod tests {
                 let f = |t: f64| smooth.evaluate(w(t).as_ref(), 10, None);
                 let h = 2e-4;
                 let numeric = (8.0 * (f(h) - f(-h)) - (f(2.0 * h) - f(-2.0 * h))) / (12.0 * h);
-                prop_assert!((slope - numeric).abs() < 1e-9 * slope.abs().max(1.0), "{criterion:?}: {slope} {numeric}");
+                // Unit columns undo the spread: eigenvalues may come close, and the truncation grows with gap⁻⁴.
+                let unit = matches!(
+                    criterion,
+                    Criterion::TwoNorm(Scaling::Equilibrated) | Criterion::Frobenius(Scaling::Equilibrated)
+                );
+                let tolerance = if unit { 1e-5 } else { 1e-9 };
+                prop_assert!(
+                    (slope - numeric).abs() < tolerance * slope.abs().max(1.0),
+                    "{criterion:?}: {slope} {numeric}"
+                );
             }
         }
     }
