@@ -119,7 +119,7 @@ pub(crate) fn link_energies<T: Lane>(model: &Model, q: &[T], qd: &[T], links: &m
     for (j, joint) in model.joints.iter().enumerate() {
         let travel = Travel::new(joint, q[j]);
         let below = joint.parent.map_or(base, |p| all[p]);
-        let gravity = travel.to_inner(joint.step.rotation.to_inner(below.gravity));
+        let gravity = travel.inward(joint.step.rotation.inward(below.gravity));
         let mut potential = below.potential - dot(below.gravity, joint.step.translation());
         if let Travel::Slide { d } = travel {
             potential = potential - gravity[2] * d;

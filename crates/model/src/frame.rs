@@ -50,7 +50,7 @@ pub(crate) struct Fixed {
 impl Rotation {
     /// `Rᵀ v`: a vector of the outer frame in the inner one.
     #[inline(always)]
-    pub(crate) fn to_inner<T: Lane>(&self, v: V3<T>) -> V3<T> {
+    pub(crate) fn inward<T: Lane>(&self, v: V3<T>) -> V3<T> {
         match *self {
             Self::None => v,
             Self::Quarter => [v[0], v[2], -v[1]],
@@ -68,7 +68,7 @@ impl Rotation {
 
     /// `R v`: a vector of the inner frame in the outer one.
     #[inline(always)]
-    pub(crate) fn to_outer<T: Lane>(&self, v: V3<T>) -> V3<T> {
+    pub(crate) fn outward<T: Lane>(&self, v: V3<T>) -> V3<T> {
         match *self {
             Self::None => v,
             Self::Quarter => [v[0], -v[2], v[1]],

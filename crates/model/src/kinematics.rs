@@ -47,7 +47,7 @@ impl<T: Lane> Travel<T> {
 
     /// `Rᵀ v`.
     #[inline(always)]
-    pub(crate) fn to_inner(self, v: V3<T>) -> V3<T> {
+    pub(crate) fn inward(self, v: V3<T>) -> V3<T> {
         match self {
             Self::Turn { s, c } => [
                 c.mul_add(v[0], s * v[1]),
@@ -61,18 +61,18 @@ impl<T: Lane> Travel<T> {
     /// A vector of the joint below's frame in this joint's.
     #[inline(always)]
     pub(crate) fn into_joint(self, joint: &KernelJoint, v: V3<T>) -> V3<T> {
-        self.to_inner(joint.step.rotation.to_inner(v))
+        self.inward(joint.step.rotation.inward(v))
     }
 
     /// A vector of this joint's frame in that of the joint below.
     #[inline(always)]
     pub(crate) fn out_of_joint(self, joint: &KernelJoint, v: V3<T>) -> V3<T> {
-        joint.step.rotation.to_outer(self.to_outer(v))
+        joint.step.rotation.outward(self.outward(v))
     }
 
     /// `R v`.
     #[inline(always)]
-    pub(crate) fn to_outer(self, v: V3<T>) -> V3<T> {
+    pub(crate) fn outward(self, v: V3<T>) -> V3<T> {
         match self {
             Self::Turn { s, c } => [
                 c.mul_add(v[0], -(s * v[1])),

@@ -204,13 +204,13 @@ impl<T: Lane> Kinematics<T> {
         let below = &self.motion[j];
         let carried = match joint.parent {
             None => {
-                let up = joint.step.rotation.to_inner(minus(model.gravity));
+                let up = joint.step.rotation.inward(minus(model.gravity));
                 let vertical = up[0] == 0.0 && up[1] == 0.0;
                 let a = splat(up);
                 LinkMotion {
                     w: zero(),
                     wd: zero(),
-                    a: if vertical { a } else { step.1.to_inner(a) },
+                    a: if vertical { a } else { step.1.inward(a) },
                 }
             }
             Some(p) if model.joints[p].planar => {
@@ -289,7 +289,7 @@ impl<T: Lane> Kinematics<T> {
 /// A vector of the joint below's frame in a joint's.
 #[inline(always)]
 fn into_joint<T: Lane>((rotation, travel): (Rotation, Travel<T>), v: V3<T>) -> V3<T> {
-    travel.to_inner(rotation.to_inner(v))
+    travel.inward(rotation.inward(v))
 }
 
 #[inline(always)]
