@@ -1,73 +1,91 @@
-//! Interior-point descent over the coefficients of a Fourier series, with a quasi-Newton model of the criterion.
+//! Interior-point descent over the variables of a Fourier series: exact gradients, a learned model of the criterion's
+//! curvature, logarithmic barriers of the limits with multipliers of their own.
 
 use crate::dense::{cholesky, dot};
-use crate::fourier_limits::BoundedSeries;
+use crate::fourier_curvature::{LearnedCurvature, add_bound_curvature};
+use crate::fourier_limits::Bounds;
 use crate::fourier_objective::FourierObjective;
 
 /// Share of the way to a limit that a step may go.
 const TO_BOUNDARY: f64 = 0.99;
 /// Part of the slope a step must gain.
 const ARMIJO: f64 = 1e-4;
+/// Halvings of a step before it counts as impossible: 2^-25 of it moves nothing any more.
+const MAX_HALVINGS: usize = 25;
+/// How far a multiplier may stray from `barrier / slack`, as a factor.
+const MULTIPLIER_RANGE: f64 = 1e3;
+/// After limits were added the motion stands this fraction inside them.
+const ROOM: f64 = 1e-5;
+/// Extrema using more of a limit than this are imposed.
+const NEAR: f64 = 0.9;
+
+/// What a step did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Step {
+    /// Squared length of the Newton step in its own metric: twice what it was expected to gain.
+    pub(crate) decrement: f64,
+    /// Whether a lower point was found.
+    pub(crate) moved: bool,
+}
 
 pub(crate) struct Interior<'p, 'm> {
-    pub(crate) bounds: BoundedSeries,
+    pub(crate) bounds: Bounds,
+    fine: Bounds,
     pub(crate) objective: &'p mut FourierObjective<'m>,
     pub(crate) x: Vec<f64>,
+    /// Fraction of the limit used by every bound.
     used: Vec<f64>,
+    /// Multipliers of `used < 1` and of `-1 < used`.
     up: Vec<f64>,
     low: Vec<f64>,
-    /// Model of the criterion's curvature, full, row by row.
-    b: Vec<f64>,
-    fresh: bool,
-    pub(crate) f: f64,
-    g: Vec<f64>,
-    pub(crate) n_steps: usize,
+    curvature: LearnedCurvature,
+    value: f64,
+    gradient: Vec<f64>,
 }
 
 impl<'p, 'm> Interior<'p, 'm> {
+    /// Starts from `x`, drawn in to use at most `largest_use` of the limits.
     pub(crate) fn new(
-        bounds: BoundedSeries,
+        bounds: Bounds,
         objective: &'p mut FourierObjective<'m>,
         x: Vec<f64>,
-        mu: f64,
+        largest_use: f64,
+        barrier: f64,
     ) -> Self {
-        let n = x.len();
-        let mut b = vec![0.0; n * n];
-        for i in 0..n {
-            b[i * n + i] = 1.0;
-        }
+        let fine = bounds.fine();
         let mut new = Self {
+            curvature: LearnedCurvature::new(x.len()),
             bounds,
+            fine,
             objective,
             x,
             used: Vec::new(),
             up: Vec::new(),
             low: Vec::new(),
-            b,
-            fresh: true,
-            f: 0.0,
-            g: Vec::new(),
-            n_steps: 0,
+            value: f64::INFINITY,
+            gradient: Vec::new(),
         };
-        new.restart_multipliers(mu);
+        new.fine.draw_in(&mut new.x, largest_use);
+        new.bounds.draw_in(&mut new.x, largest_use);
+        new.restart_multipliers(barrier);
         new.evaluate();
         new
     }
 
-    pub(crate) fn restart_multipliers(&mut self, mu: f64) {
+    fn restart_multipliers(&mut self, barrier: f64) {
         self.used = self.bounds.used(&self.x);
-        self.up = self.used.iter().map(|u| mu / (1.0 - u)).collect();
-        self.low = self.used.iter().map(|u| mu / (1.0 + u)).collect();
+        self.up = self.used.iter().map(|u| barrier / (1.0 - u)).collect();
+        self.low = self.used.iter().map(|u| barrier / (1.0 + u)).collect();
     }
 
-    /// Adds the limits at the extrema of where the search stands, and draws it inside them.
-    pub(crate) fn sharpen(&mut self, mu: f64) {
+    /// Imposes the limits at the extrema of where the search stands, and draws it inside them.
+    pub(crate) fn sharpen(&mut self, barrier: f64) {
         let before: Vec<usize> = self.bounds.joints.iter().map(|j| j.offset.len()).collect();
-        self.bounds.add_extrema(&self.x, 0.9);
-        self.bounds.draw_in(&mut self.x, 1.0 - 1e-5);
+        self.bounds.add_extrema(&self.fine, &self.x, NEAR);
+        self.bounds.draw_in(&mut self.x, 1.0 - ROOM);
         let old_up = std::mem::take(&mut self.up);
         let old_low = std::mem::take(&mut self.low);
-        self.restart_multipliers(mu);
+        self.restart_multipliers(barrier);
         let (mut from, mut to) = (0, 0);
         for (j, count) in before.iter().enumerate() {
             self.up[to..to + count].copy_from_slice(&old_up[from..from + count]);
@@ -78,147 +96,185 @@ impl<'p, 'm> Interior<'p, 'm> {
         self.evaluate();
     }
 
-    /// After a change of the objective.
+    /// After a change of the objective or of the place.
     pub(crate) fn evaluate(&mut self) {
-        self.f = self.objective.value(&self.bounds.coefficients(&self.x));
-        self.g = self.gradient();
+        self.value = self
+            .objective
+            .value(&self.bounds.chart.coefficients(&self.x));
+        self.gradient = self.gradient_here();
     }
 
-    fn gradient(&self) -> Vec<f64> {
-        let mut g = self.objective.gradient();
-        for (g, s) in g.iter_mut().zip(&self.bounds.size) {
-            *g *= s;
-        }
-        g
+    fn gradient_here(&mut self) -> Vec<f64> {
+        self.bounds.chart.pull_back(&self.objective.gradient())
     }
 
-    fn barrier(used: &[f64]) -> f64 {
-        // Products of slacks, to take one logarithm for many of them.
-        let mut sum = 0.0;
-        for chunk in used.chunks(16) {
-            let product: f64 = chunk.iter().map(|u| (1.0 - u) * (1.0 + u)).product();
-            sum -= product.ln();
-        }
-        sum
-    }
-
-    /// One step; the squared Newton decrement before it, and whether it could be made.
-    pub(crate) fn step(&mut self, mu: f64) -> (f64, bool) {
-        let n = self.x.len();
-        self.n_steps += 1;
-        let m = self.used.len();
-        let mut h = self.b.clone();
-        let mut weights = vec![0.0; m];
-        let mut pull = vec![0.0; m];
-        for i in 0..m {
-            let (a, b) = (1.0 / (1.0 - self.used[i]), 1.0 / (1.0 + self.used[i]));
-            weights[i] = self.up[i] * a + self.low[i] * b;
-            pull[i] = mu * (a - b);
-        }
-        self.bounds.add_curvature(&weights, &mut h);
-        let mut slope = self.g.clone();
-        self.bounds.add_transpose(&pull, &mut slope);
-        if !cholesky(&mut h, n) {
-            return (f64::INFINITY, false);
-        }
-        let mut d: Vec<f64> = slope.iter().map(|s| -s).collect();
-        solve(&h, n, &mut d);
-        let descent = dot(&slope, &d);
-        let du = self.bounds.change(&d);
-        let (mut alpha, mut alpha_dual) = (1.0_f64, 1.0_f64);
-        let mut dz = vec![(0.0, 0.0); m];
-        for i in 0..m {
-            let (u, du) = (self.used[i], du[i]);
-            if du > 0.0 {
-                alpha = alpha.min(TO_BOUNDARY * (1.0 - u) / du);
-            } else if du < 0.0 {
-                alpha = alpha.min(TO_BOUNDARY * (1.0 + u) / -du);
+    /// One step for this weight of the barrier.
+    pub(crate) fn step(&mut self, barrier: f64) -> Step {
+        let Some((direction, descent)) = self.direction(barrier) else {
+            return Step {
+                decrement: f64::INFINITY,
+                moved: false,
+            };
+        };
+        let change = self.bounds.change(&direction);
+        let (largest, largest_dual, multiplier_steps) = self.largest_steps(&change, barrier);
+        let start = self.value + barrier * log_barrier(&self.used);
+        let mut length = largest;
+        for _ in 0..MAX_HALVINGS {
+            let x = moved(&self.x, length, &direction);
+            let used = moved(&self.used, length, &change);
+            let value = self.objective.value(&self.bounds.chart.coefficients(&x));
+            if value + barrier * log_barrier(&used) <= start + ARMIJO * length * descent {
+                let old = std::mem::take(&mut self.gradient);
+                (self.value, self.used) = (value, used);
+                self.gradient = self.gradient_here();
+                self.curvature
+                    .learn(&difference(&x, &self.x), &difference(&self.gradient, &old));
+                self.x = x;
+                self.move_multipliers(largest_dual, &multiplier_steps, barrier);
+                return Step {
+                    decrement: -descent,
+                    moved: true,
+                };
             }
-            let up = mu / (1.0 - u) - self.up[i] + self.up[i] / (1.0 - u) * du;
-            let low = mu / (1.0 + u) - self.low[i] - self.low[i] / (1.0 + u) * du;
-            for (z, d) in [(self.up[i], up), (self.low[i], low)] {
-                if d < 0.0 {
-                    alpha_dual = alpha_dual.min(-TO_BOUNDARY * z / d);
+            length *= 0.5;
+        }
+        // The objective remembers a rejected place.
+        self.evaluate();
+        Step {
+            decrement: -descent,
+            moved: false,
+        }
+    }
+
+    /// Newton direction of the barrier problem and the slope along it; `None` where rounding left no descent.
+    fn direction(&self, barrier: f64) -> Option<(Vec<f64>, f64)> {
+        pulp::Arch::new().dispatch(Newton {
+            gradient: &self.gradient,
+            curvature: self.curvature.matrix(),
+            bounds: &self.bounds,
+            used: &self.used,
+            multipliers: [&self.up, &self.low],
+            barrier,
+        })
+    }
+
+    /// Longest steps of the motion and of the multipliers that keep all slacks, and the steps of the multipliers.
+    fn largest_steps(&self, change: &[f64], barrier: f64) -> (f64, f64, Vec<[f64; 2]>) {
+        let (mut length, mut dual) = (1.0_f64, 1.0_f64);
+        let mut steps = Vec::with_capacity(change.len());
+        for (i, &du) in change.iter().enumerate() {
+            let (a, b) = (1.0 / (1.0 - self.used[i]), 1.0 / (1.0 + self.used[i]));
+            // The fastest approach to either limit, as the inverse of the steps it takes.
+            let approach = (du * a).max(-du * b);
+            if approach * length > TO_BOUNDARY {
+                length = TO_BOUNDARY / approach;
+            }
+            let up = barrier * a - self.up[i] + self.up[i] * a * du;
+            let low = barrier * b - self.low[i] - self.low[i] * b * du;
+            for (z, dz) in [(self.up[i], up), (self.low[i], low)] {
+                if -dz * dual > TO_BOUNDARY * z {
+                    dual = TO_BOUNDARY * z / -dz;
                 }
             }
-            dz[i] = (up, low);
+            steps.push([up, low]);
         }
-        let start = self.f + mu * Self::barrier(&self.used);
-        let mut accepted = None;
-        for _ in 0..25 {
-            let x: Vec<f64> = self.x.iter().zip(&d).map(|(x, d)| x + alpha * d).collect();
-            let used: Vec<f64> = self
-                .used
-                .iter()
-                .zip(&du)
-                .map(|(u, d)| u + alpha * d)
-                .collect();
-            let f = self.objective.value(&self.bounds.coefficients(&x));
-            if f + mu * Self::barrier(&used) <= start + ARMIJO * alpha * descent {
-                accepted = Some((x, used, f));
-                break;
-            }
-            alpha *= 0.5;
-        }
-        let Some((x, used, f)) = accepted else {
-            // The objective's memory is of a rejected point.
-            self.evaluate();
-            return (-descent, false);
-        };
-        self.f = f;
-        let old_g = std::mem::take(&mut self.g);
-        self.g = self.gradient();
-        let s: Vec<f64> = x.iter().zip(&self.x).map(|(a, b)| a - b).collect();
-        let y: Vec<f64> = self.g.iter().zip(&old_g).map(|(a, b)| a - b).collect();
-        self.update(&s, &y);
-        self.x = x;
-        self.used = used;
-        for i in 0..m {
-            let (a, b) = (mu / (1.0 - self.used[i]), mu / (1.0 + self.used[i]));
-            self.up[i] = (self.up[i] + alpha_dual * dz[i].0).clamp(a * 1e-3, a * 1e3);
-            self.low[i] = (self.low[i] + alpha_dual * dz[i].1).clamp(b * 1e-3, b * 1e3);
-        }
-        (-descent, true)
+        (length, dual, steps)
     }
 
-    /// Damped BFGS (Powell 1978).
-    fn update(&mut self, s: &[f64], y: &[f64]) {
-        let n = s.len();
-        let sy = dot(s, y);
-        if self.fresh && sy > 0.0 {
-            let gamma = dot(y, y) / sy;
-            for i in 0..n {
-                self.b[i * n + i] = gamma;
-            }
-            self.fresh = false;
-        }
-        let bs: Vec<f64> = self.b.chunks_exact(n).map(|r| dot(r, s)).collect();
-        let sbs = dot(s, &bs);
-        if sbs <= 0.0 {
-            return;
-        }
-        let theta = if sy >= 0.2 * sbs {
-            1.0
-        } else {
-            0.8 * sbs / (sbs - sy)
-        };
-        let r: Vec<f64> = y
-            .iter()
-            .zip(&bs)
-            .map(|(y, b)| theta * y + (1.0 - theta) * b)
-            .collect();
-        let sr = dot(s, &r);
-        for i in 0..n {
-            let (p, q) = (r[i] / sr, bs[i] / sbs);
-            let row = &mut self.b[i * n..(i + 1) * n];
-            for j in 0..n {
-                row[j] += p * r[j] - q * bs[j];
-            }
+    fn move_multipliers(&mut self, length: f64, steps: &[[f64; 2]], barrier: f64) {
+        for (i, [up, low]) in steps.iter().enumerate() {
+            let a = barrier / (1.0 - self.used[i]);
+            let b = barrier / (1.0 + self.used[i]);
+            let range = |z: f64, m: f64| z.clamp(m / MULTIPLIER_RANGE, m * MULTIPLIER_RANGE);
+            self.up[i] = range(self.up[i] + length * up, a);
+            self.low[i] = range(self.low[i] + length * low, b);
         }
     }
 }
 
+/// The Newton direction of a barrier problem, dispatched to the widest registers of the machine.
+struct Newton<'a> {
+    gradient: &'a [f64],
+    curvature: &'a [f64],
+    bounds: &'a Bounds,
+    used: &'a [f64],
+    multipliers: [&'a [f64]; 2],
+    barrier: f64,
+}
+
+impl pulp::WithSimd for Newton<'_> {
+    type Output = Option<(Vec<f64>, f64)>;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, simd: S) -> Self::Output {
+        let n = self.gradient.len();
+        let mut slope = self.gradient.to_vec();
+        let mut h = self.curvature.to_vec();
+        self.add_barrier(simd, &mut slope, &mut h);
+        let mut direction: Vec<f64> = slope.iter().map(|s| -s).collect();
+        if !cholesky(&mut h, n) {
+            return None;
+        }
+        solve(&h, n, &mut direction);
+        let descent = dot(&slope, &direction);
+        (descent < 0.0).then_some((direction, descent))
+    }
+}
+
+impl Newton<'_> {
+    /// Adds the barrier's gradient to `slope` and its primal-dual curvature to the lower triangle of `h`.
+    #[inline(always)]
+    fn add_barrier<S: pulp::Simd>(&self, simd: S, slope: &mut [f64], h: &mut [f64]) {
+        let n = slope.len();
+        let width = self.bounds.chart.width();
+        let [up, low] = self.multipliers;
+        let (mut weights, mut pull, mut scratch) = (Vec::new(), Vec::new(), Vec::new());
+        let mut from = 0;
+        for (j, bounds) in self.bounds.joints.iter().enumerate() {
+            let count = bounds.offset.len();
+            let here = from..from + count;
+            from += count;
+            weights.resize(count, 0.0);
+            pull.resize(count, 0.0);
+            let (used, up, low) = (&self.used[here.clone()], &up[here.clone()], &low[here]);
+            for i in 0..count {
+                let (a, b) = (1.0 / (1.0 - used[i]), 1.0 / (1.0 + used[i]));
+                weights[i] = up[i] * a + low[i] * b;
+                pull[i] = self.barrier * (a - b);
+            }
+            for (s, column) in slope[j * width..].iter_mut().zip(&bounds.columns) {
+                *s += dot(&pull, column);
+            }
+            let place = (j * width, n);
+            add_bound_curvature(simd, bounds, &weights, &mut scratch, place, h);
+        }
+    }
+}
+
+/// `-Σ log((1 - u) (1 + u))`; a product of many factors at a time, to take one logarithm for them.
+fn log_barrier(used: &[f64]) -> f64 {
+    let mut sum = 0.0;
+    for chunk in used.chunks(16) {
+        let product: f64 = chunk.iter().map(|u| (1.0 - u) * (1.0 + u)).product();
+        sum -= product.ln();
+    }
+    sum
+}
+
+fn moved(x: &[f64], length: f64, direction: &[f64]) -> Vec<f64> {
+    x.iter()
+        .zip(direction)
+        .map(|(x, d)| x + length * d)
+        .collect()
+}
+
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}
+
 /// `L Lᵀ x = b` in place.
+#[inline(always)]
 fn solve(l: &[f64], n: usize, b: &mut [f64]) {
     for i in 0..n {
         b[i] = (b[i] - dot(&l[i * n..i * n + i], &b[..i])) / l[i * n + i];

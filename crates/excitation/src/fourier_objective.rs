@@ -1,10 +1,10 @@
-//! A smooth criterion of the torque regressor along a Fourier motion, and its exact gradient by the coefficients.
+//! Criteria of the torque regressor along a Fourier motion, and their exact gradient by the coefficients.
 //!
-//! With `A = Σ YᵀY` and `S = ∂f/∂A`: `df = 2 Σ_t ⟨Y_t S, dY_t⟩`, which the model's reverse mode takes to the states and
-//! the transpose of the basis to the coefficients.
+//! With `A = A₀ + Σ Yᵀ D Y` and `S = ∂f/∂A`: `df = 2 Σ_t ⟨D Y_t S, dY_t⟩`, which the model's reverse mode takes to the
+//! states and the transpose of the basis to the coefficients.
 
-use crate::Conditioning;
 use crate::FourierOptions;
+use crate::fourier_contraction::Contraction;
 use crate::spectrum::{SmoothCriterion, SpectralPoint};
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, Mat, Par};
@@ -13,17 +13,23 @@ use idim_model::{
 };
 use idim_trajectory::FourierBasis;
 
-/// The function an optimiser lowers: coefficients (joint after joint) to the logarithm of the criterion.
+/// The function an optimiser lowers: coefficients (joint after joint) to a weighted sum of criteria's logarithms.
 pub(crate) struct FourierObjective<'a> {
     model: &'a Model,
     columns: &'a Columns,
-    pub(crate) criterion: SmoothCriterion,
+    exact: Vec<(f64, SmoothCriterion)>,
+    criteria: Vec<(f64, SmoothCriterion)>,
     basis: FourierBasis,
+    contraction: Contraction,
+    /// Inverse noise of each joint's torque, relative.
+    joint_scale: Vec<f64>,
+    /// What earlier logs tell, in units of this motion's samples.
+    prior: Option<Mat<f64>>,
     states: JointStates,
-    /// Stacked rows, joint after joint: row `joint · n_samples + sample`, so that lanes lie side by side.
+    /// Stacked rows over the noise, joint after joint: row `joint · n_samples + sample`, so that lanes lie together.
     w: Mat<f64>,
     information: Mat<f64>,
-    point: Option<SpectralPoint>,
+    points: Vec<SpectralPoint>,
     n_evaluations: usize,
 }
 
@@ -31,19 +37,29 @@ impl<'a> FourierObjective<'a> {
     pub(crate) fn new(
         model: &'a Model,
         columns: &'a Columns,
-        criterion: SmoothCriterion,
+        criteria: &[(f64, SmoothCriterion)],
         options: &FourierOptions,
     ) -> Self {
         let n_rows = model.n_joints() * options.n_samples;
+        let joint_scale: Vec<f64> = if options.torque_noise.is_empty() {
+            vec![1.0; model.n_joints()]
+        } else {
+            options.torque_noise.iter().map(|s| 1.0 / s).collect()
+        };
+        let prior = options.prior_information.as_ref();
         Self {
             model,
             columns,
-            criterion,
+            exact: criteria.to_vec(),
+            criteria: criteria.to_vec(),
             basis: FourierBasis::equispaced(options.period, options.n_harmonics, options.n_samples),
+            contraction: Contraction::new(model, columns),
+            joint_scale,
+            prior: prior.map(|a| faer::Scale(options.n_samples as f64) * a),
             states: JointStates::zeros(model.n_joints(), options.n_samples),
             w: Mat::zeros(n_rows, columns.len()),
             information: Mat::zeros(columns.len(), columns.len()),
-            point: None,
+            points: Vec::new(),
             n_evaluations: 0,
         }
     }
@@ -52,67 +68,163 @@ impl<'a> FourierObjective<'a> {
         self.n_evaluations
     }
 
-    pub(crate) fn conditioning(&mut self, coefficients: &[f64]) -> Conditioning {
-        self.update(coefficients);
-        Conditioning::of_rows(self.w.as_ref(), self.basis.n_samples())
+    /// Puts norms of this power in the place of extreme eigenvalues; `None`: the criteria themselves.
+    pub(crate) fn smooth(&mut self, power: Option<f64>) {
+        self.criteria.clone_from(&self.exact);
+        if let Some(power) = power {
+            for (_, criterion) in &mut self.criteria {
+                *criterion = criterion.smoothed(power);
+            }
+        }
     }
 
-    /// Logarithm of the criterion; infinite where columns are dependent.
+    /// Weighted sum of the logarithms; infinite where columns are dependent.
     pub(crate) fn value(&mut self, coefficients: &[f64]) -> f64 {
-        self.update(coefficients);
+        self.n_evaluations += 1;
+        self.fill_rows(coefficients);
         let (a, w) = (self.information.as_mut(), self.w.as_ref());
         let (full, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
         let wt = w.transpose();
         matmul(a, lower, Accum::Replace, wt, full, w, full, 1.0, Par::Seq);
-        let point = self
-            .criterion
-            .at(self.information.as_ref(), self.basis.n_samples());
-        let value = point.value;
-        self.point = Some(point);
-        value
+        if let Some(prior) = &self.prior {
+            self.information += prior;
+        }
+        let (a, n) = (self.information.as_ref(), self.basis.n_samples());
+        self.points = self.criteria.iter().map(|(_, c)| c.at(a, n)).collect();
+        let terms = self.criteria.iter().zip(&self.points);
+        terms.map(|((weight, _), point)| weight * point.value).sum()
     }
 
-    /// Gradient where the value was asked for last.
-    ///
-    /// # Panics
-    /// If no value was asked for.
-    pub(crate) fn gradient(&self) -> Vec<f64> {
-        let point = self.point.as_ref().expect("a value comes first");
-        let s = self.criterion.by_information(point);
-        let n = self.w.ncols();
+    /// Gradient where the value was asked for last; zero where that was infinite.
+    pub(crate) fn gradient(&mut self) -> Vec<f64> {
+        let n = self.columns.len();
+        let mut s = Mat::<f64>::zeros(n, n);
+        for ((weight, criterion), point) in self.criteria.iter().zip(&self.points) {
+            s += faer::Scale(2.0 * weight) * criterion.by_information(point);
+        }
+        let weights: Vec<f64> = self.joint_scale.iter().map(|s| s * s).collect();
+        self.contraction.set_matrix(s.as_ref());
+        let contraction = &self.contraction;
         let by_states =
             regressor_contraction_gradient(self.model, self.columns, &self.states, |y, g| {
-                for joint in 0..y.n_joints() {
-                    for b in 0..n {
-                        let mut sum = [0.0; 8];
-                        for a in 0..n {
-                            let (lanes, s) = (y.lanes(joint, a), 2.0 * s[(a, b)]);
-                            for k in 0..8 {
-                                sum[k] += lanes[k] * s;
-                            }
-                        }
-                        *g.lanes_mut(joint, b) = sum;
-                    }
-                }
+                contraction.contract(y, &weights, g);
             });
         self.basis.pull_back(&by_states)
     }
 
-    fn update(&mut self, coefficients: &[f64]) {
-        self.n_evaluations += 1;
+    fn fill_rows(&mut self, coefficients: &[f64]) {
         self.basis.states_into(coefficients, &mut self.states);
         let n = self.states.n_samples();
-        let w = &mut self.w;
+        let (w, scale) = (&mut self.w, &self.joint_scale);
         visit_torque_regressor(self.model, self.columns, &self.states, |block| {
             let (first, count) = (block.first_sample(), block.n_samples());
-            for joint in 0..block.n_joints() {
-                for column in 0..block.n_columns() {
-                    let lanes = block.lanes(joint, column);
-                    for (k, value) in lanes[..count].iter().enumerate() {
-                        w[(joint * n + first + k, column)] = *value;
+            for column in 0..block.n_columns() {
+                let out = w.col_as_slice_mut(column);
+                for (joint, scale) in scale.iter().enumerate() {
+                    let out = &mut out[joint * n + first..][..count];
+                    for (o, value) in out.iter_mut().zip(block.lanes(joint, column)) {
+                        *o = scale * value;
                     }
                 }
             }
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+
+    use super::*;
+    use crate::{Criterion, Scaling};
+    use idim_model::robot_from_ron;
+    use idim_trajectory::{Limits, random_series};
+    use proptest::prelude::*;
+
+    /// Base columns of the first three joints of a PUMA 560, some friction and a rotor.
+    fn columns() -> Columns {
+        use idim_model::Parameter;
+        use idim_model::ParameterKind::{Fv, Ia, MX, MY, XX, XY, XZ, YZ, ZZ};
+        let named = [
+            (ZZ, 0),
+            (XX, 1),
+            (XY, 1),
+            (XZ, 1),
+            (YZ, 1),
+            (ZZ, 1),
+            (MX, 1),
+            (MY, 1),
+            (XX, 2),
+            (XY, 2),
+            (XZ, 2),
+            (YZ, 2),
+            (ZZ, 2),
+            (MX, 2),
+            (MY, 2),
+            (Fv, 0),
+            (Ia, 2),
+        ];
+        Columns(
+            named
+                .map(|(kind, index)| Parameter { kind, index })
+                .to_vec(),
+        )
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        #[test]
+        fn identity_the_gradient_is_the_slope_in_any_direction(
+            seed in 0..1000_u64,
+            direction in prop::collection::vec(-1.0..1.0_f64, 21),
+            plain in proptest::bool::ANY,
+        ) {
+            let model = Model::new(&robot_from_ron(idim_fixtures::PUMA3R).unwrap());
+            let columns = columns();
+            let limits = Limits {
+                position: vec![[-2.0, 1.0]; 3],
+                velocity: vec![2.0; 3],
+                acceleration: vec![6.0; 3],
+            };
+            let noise = if plain { vec![] } else { vec![0.5, 2.0, 1.0] };
+            let prior = Mat::<f64>::identity(17, 17);
+            let options = FourierOptions {
+                period: 7.0,
+                n_harmonics: 3,
+                // Not a whole number of blocks.
+                n_samples: 45,
+                torque_noise: noise,
+                prior_information: (!plain).then_some(prior),
+                ..FourierOptions::default()
+            };
+            let c = random_series(&limits, 3, 7.0, seed).coefficients();
+            let moved = |t: f64| -> Vec<f64> {
+                c.iter().zip(&direction).map(|(c, d)| c + t * d).collect()
+            };
+            for criterion in [
+                Criterion::TwoNorm(Scaling::Raw),
+                Criterion::TwoNorm(Scaling::Equilibrated),
+                Criterion::LogDet,
+                Criterion::TraceInverse,
+                Criterion::WorstDirection,
+            ] {
+                let smooth = SmoothCriterion::new(criterion).unwrap();
+                let criteria = [(0.7, smooth), (0.1, SmoothCriterion::new(Criterion::LogDet).unwrap())];
+                let mut objective = FourierObjective::new(&model, &columns, &criteria, &options);
+                // Without crossings of extreme eigenvalues.
+                objective.smooth(Some(3.0));
+                let mut f = |t: f64| objective.value(&moved(t));
+                // Five-point difference: truncation h⁴ times some thousand, rounding 1e-16 cond(A) / h.
+                let h = 5e-4;
+                let numeric = (8.0 * (f(h) - f(-h)) - (f(2.0 * h) - f(-2.0 * h))) / (12.0 * h);
+                f(0.0);
+                let exact = crate::dense::dot(&objective.gradient(), &direction);
+                prop_assert!(
+                    (exact - numeric).abs() < 1e-8 * exact.abs().max(1.0),
+                    "{:?}: {} against {}", criterion, exact, numeric
+                );
+            }
+        }
     }
 }

@@ -1,24 +1,67 @@
-//! One search for a Fourier motion: from a random start through ever sharper criteria and barriers to a certificate.
+//! One search for a Fourier motion: through ever sharper criteria and barriers to a certificate.
 
 use crate::FourierOptions;
+use crate::fourier_chart::Chart;
 use crate::fourier_interior::Interior;
-use crate::fourier_limits::BoundedSeries;
+use crate::fourier_limits::Bounds;
 use crate::fourier_objective::FourierObjective;
-use idim_trajectory::{Certificate, FourierSeries, Limits, random_series};
-use std::f64::consts::TAU;
+use crate::spectrum::SmoothCriterion;
+use idim_model::{Columns, Model};
+use idim_trajectory::{Certificate, FourierSeries, Limits};
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The first start uses this much of the limits: a step inside them, where the barrier is still flat.
-const START_USE: f64 = 0.7;
-/// Power of the norms that stand for extreme eigenvalues, and its growth from stage to stage.
-const POWER: [f64; 2] = [4.0, 1.5];
-/// Weight of the logarithmic barrier of the limits, and its decay from stage to stage.
-const BARRIER: [f64; 2] = [3e-3, 0.5];
-/// At the last one the norms are within 1 % of the eigenvalues and the barrier costs less than 0.1 %.
-const N_STAGES: usize = 10;
+/// How sharp a search begins, and for how many stages it goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Schedule {
+    /// Power of the norms that stand for extreme eigenvalues.
+    power: f64,
+    /// Weight of the logarithmic barrier of the limits.
+    barrier: f64,
+    n_stages: usize,
+    /// From this stage on limits are imposed at the extrema as well.
+    sharp_stage: usize,
+}
+
+/// From anywhere. At the last stage the norms are within 1 % of the eigenvalues and the barrier costs below 0.1 %.
+pub(crate) const EXPLORE: Schedule = Schedule {
+    power: 4.0,
+    barrier: 3e-3,
+    n_stages: 10,
+    sharp_stage: 4,
+};
+/// From beside a good motion: a barrier as weak as it was on the way there, so that it does not lead back.
+pub(crate) const REVISIT: Schedule = Schedule {
+    power: 13.5,
+    barrier: 3e-4,
+    n_stages: 7,
+    sharp_stage: 2,
+};
+/// From a good motion: the last tenths of a percent.
+pub(crate) const FINISH: Schedule = Schedule {
+    power: 100.0,
+    barrier: 1e-5,
+    n_stages: 6,
+    sharp_stage: 0,
+};
+/// Growth of the power and decay of the barrier from stage to stage.
+const SHARPENING: [f64; 2] = [1.5, 0.5];
 /// Steps of a stage: what is left over, the next one does as well.
 const MAX_STEPS: usize = 30;
-/// From this stage on limits are imposed at the extrema as well.
-const SHARP_STAGE: usize = 4;
+/// A stage ends when a step promises less than this share of what the smoothing still hides.
+const STAGE_TOLERANCE: f64 = 0.1;
+/// A start comes this near to the limits at most: the barrier is infinite on them.
+const LARGEST_USE: f64 = 0.98;
+
+/// What all searches share.
+pub(crate) struct Task<'a> {
+    pub(crate) model: &'a Model,
+    pub(crate) columns: &'a Columns,
+    pub(crate) criteria: Vec<(f64, SmoothCriterion)>,
+    pub(crate) limits: &'a Limits,
+    pub(crate) options: &'a FourierOptions,
+    pub(crate) chart: Chart,
+    pub(crate) stop: &'a AtomicBool,
+}
 
 /// A certified motion.
 #[derive(Debug, Clone)]
@@ -29,84 +72,94 @@ pub(crate) struct Found {
     pub(crate) value: f64,
 }
 
+/// What a search came to.
+#[derive(Debug, Clone)]
 pub(crate) struct Search {
     /// `None` when nothing could be certified.
     pub(crate) found: Option<Found>,
     pub(crate) n_evaluations: usize,
 }
 
-/// Searches from the random motion of number `start`.
-pub(crate) fn search(
-    objective: &mut FourierObjective<'_>,
-    limits: &Limits,
-    options: &FourierOptions,
-    start: u64,
-) -> Search {
-    let seed = options.seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ start;
-    let inside = limits.scaled(START_USE, START_USE, START_USE);
-    let series = random_series(&inside, options.n_harmonics, options.period, seed);
-    let bounds = BoundedSeries::new(
-        limits,
-        options.n_harmonics,
-        options.period,
-        options.n_constraint_samples,
-    );
-    let criterion = objective.criterion;
-    let (mut power, mut barrier) = (POWER[0], BARRIER[0]);
-    objective.criterion = criterion.smoothed(power);
-    let x = bounds.variables(&series.coefficients());
-    let mut descent = Interior::new(bounds, objective, x, barrier);
-    let mut best: Option<Found> = None;
-    for stage in 0..N_STAGES {
-        descent.objective.criterion = criterion.smoothed(power);
-        if stage < SHARP_STAGE {
-            descent.evaluate();
-        } else {
-            descent.sharpen(barrier);
-        }
-        // Close enough for the next stage: a tenth of what the smoothing still hides.
-        let enough = (0.1 / power).powi(2);
-        for _ in 0..MAX_STEPS {
-            if descent.objective.n_evaluations() >= options.max_evaluations {
-                break;
-            }
-            let (decrement, moved) = descent.step(barrier);
-            if !moved || decrement < enough {
-                break;
-            }
-        }
-        let c = descent.bounds.coefficients(&descent.x);
-        descent.objective.criterion = criterion;
-        if let Some(found) = certified(descent.objective, &c, limits, options)
-            && best.as_ref().is_none_or(|b| found.value < b.value)
-        {
-            best = Some(found);
-        }
-        power *= POWER[1];
-        barrier *= BARRIER[1];
+impl Task<'_> {
+    pub(crate) fn stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
-    Search {
-        found: best,
-        n_evaluations: descent.objective.n_evaluations(),
+
+    fn bounds(&self) -> Bounds {
+        Bounds::new(
+            self.limits,
+            self.chart.clone(),
+            self.options.n_harmonics,
+            self.options.period,
+            self.options.n_constraint_samples,
+        )
+    }
+
+    /// Searches from these coefficients; told to stop, it returns what it has.
+    pub(crate) fn search(&self, start: &[f64], schedule: Schedule) -> Search {
+        let mut objective =
+            FourierObjective::new(self.model, self.columns, &self.criteria, self.options);
+        let (mut power, mut barrier) = (schedule.power, schedule.barrier);
+        objective.smooth(Some(power));
+        let x = self.chart.variables(start);
+        let bounds = self.bounds();
+        let mut descent = Interior::new(bounds, &mut objective, x, LARGEST_USE, barrier);
+        let mut best: Option<Found> = None;
+        for stage in 0..schedule.n_stages {
+            descent.objective.smooth(Some(power));
+            if stage >= schedule.sharp_stage {
+                descent.sharpen(barrier);
+            } else {
+                descent.evaluate();
+            }
+            self.descend(&mut descent, power, barrier);
+            let done = self.stopped() || self.used_up(&descent) || stage + 1 == schedule.n_stages;
+            // The last stages differ by less than the limits between their instants: the best of them counts.
+            if done || stage + 3 >= schedule.n_stages {
+                keep_better(&mut descent, &mut best);
+            }
+            if done {
+                break;
+            }
+            power *= SHARPENING[0];
+            barrier *= SHARPENING[1];
+        }
+        Search {
+            found: best,
+            n_evaluations: objective.n_evaluations(),
+        }
+    }
+
+    fn used_up(&self, descent: &Interior<'_, '_>) -> bool {
+        descent.objective.n_evaluations() >= self.options.max_evaluations
+    }
+
+    fn descend(&self, descent: &mut Interior<'_, '_>, power: f64, barrier: f64) {
+        let enough = (STAGE_TOLERANCE / power).powi(2);
+        for _ in 0..MAX_STEPS {
+            if self.stopped() || self.used_up(descent) {
+                break;
+            }
+            let step = descent.step(barrier);
+            if !step.moved || step.decrement < enough {
+                break;
+            }
+        }
     }
 }
 
-/// The motion with its certificate, shrunk by what it exceeds the limits between the instants they were imposed at.
-fn certified(
-    objective: &mut FourierObjective<'_>,
-    c: &[f64],
-    limits: &Limits,
-    options: &FourierOptions,
-) -> Option<Found> {
-    let omega = TAU / options.period;
-    let series =
-        FourierSeries::from_coefficients(omega, limits.n_joints(), options.n_harmonics, c).ok()?;
-    let series = series.shrunk_into(limits);
-    let certificate = series.certificate(limits);
-    let value = objective.value(&series.coefficients());
-    (certificate.certified && value.is_finite()).then_some(Found {
-        series,
-        certificate,
-        value,
-    })
+/// Keeps where the search stands if it can be certified and is better than what was kept before.
+fn keep_better(descent: &mut Interior<'_, '_>, best: &mut Option<Found>) {
+    let Some((series, certificate)) = descent.bounds.certified(&descent.x) else {
+        return;
+    };
+    descent.objective.smooth(None);
+    let value = descent.objective.value(&series.coefficients());
+    if value.is_finite() && best.as_ref().is_none_or(|b| value < b.value) {
+        *best = Some(Found {
+            series,
+            certificate,
+            value,
+        });
+    }
 }

@@ -37,9 +37,14 @@ mod energy;
 mod energy_gradient;
 mod error;
 mod fourier;
+mod fourier_chart;
+mod fourier_contraction;
+mod fourier_curvature;
 mod fourier_interior;
 mod fourier_limits;
 mod fourier_objective;
+mod fourier_options;
+mod fourier_rounds;
 mod fourier_search;
 mod information;
 mod padded;
@@ -57,7 +62,11 @@ mod spectrum;
 
 pub use criterion::{ConditionNumbers, Conditioning, Criterion, Equilibrium, Scaling};
 pub use error::Error;
-pub use fourier::{FourierDesign, FourierOptions, optimise_fourier, series_conditioning};
+pub use fourier::{
+    FourierDesign, FourierProgress, FourierWatch, optimise_fourier, optimise_fourier_watched,
+    series_conditioning,
+};
+pub use fourier_options::{FourierEnds, FourierOptions};
 pub use information::information_matrix;
 pub use points::{EnergyDesign, PointLimits};
 pub use points_powell::{PointDesign, PowellPointOptions, optimise_points_powell};

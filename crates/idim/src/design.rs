@@ -23,12 +23,11 @@ pub(crate) fn motion_for(
     let options = FourierOptions {
         period: PERIOD,
         n_harmonics: HARMONICS,
-        n_samples: 100,
         criterion: Criterion::TwoNorm(Scaling::Raw),
         n_starts: 4,
+        n_rounds: 1,
         seed,
-        max_evaluations: 400,
-        n_constraint_samples: 48,
+        ..FourierOptions::default()
     };
     Ok(optimise_fourier(&Model::new(robot), columns, limits, &options)?.series)
 }
