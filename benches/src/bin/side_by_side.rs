@@ -1,14 +1,24 @@
 //! CPU time of the kernels beside the anchors' figures: run both in the same minute, on the same core.
 #![allow(clippy::print_stdout)]
 
+use faer::Side;
 use idim_benches::{Case, cpu_time};
-use idim_model::{torque_regressor, visit_torque_regressor};
+use idim_excitation::information_matrix;
+use idim_model::{
+    RegressorWorkspace, regressor_contraction_gradient, squared_torque_gradient, torque_regressor,
+    torque_regressor_into, visit_torque_regressor,
+};
 use std::hint::black_box;
+
+/// Not a power of two: the joints' arrays would share the sets of the first-level cache.
+const SAMPLES: usize = 4000;
 
 fn main() {
     for case in [Case::ur5(), Case::panda()] {
         println!("{}: {} base columns", case.name, case.base.len());
         regressor(&case);
+        condition(&case);
+        gradient(&case);
     }
 }
 
@@ -23,14 +33,20 @@ fn line(what: &str, (least, median): (f64, f64), per: usize, unit: &str, scale: 
 
 /// Twin: `pin_native` regressor_call, `gb_ur5_base_8` with_sincos.
 fn regressor(case: &Case) {
-    let states = case.states(4096);
+    let states = case.states(SAMPLES);
     for (name, columns) in [("base", &case.base), ("standard", &case.standard)] {
         let time = cpu_time(41, || {
             visit_torque_regressor(&case.model, columns, &states, |block| {
                 black_box(block);
             });
         });
-        line(&format!("regressor, {name}, batch"), time, 4096, "ns", 1e9);
+        line(
+            &format!("regressor, {name}, batch"),
+            time,
+            SAMPLES,
+            "ns",
+            1e9,
+        );
     }
     let state = states.state(0);
     let time = cpu_time(41, || {
@@ -39,4 +55,86 @@ fn regressor(case: &Case) {
         }
     });
     line("regressor, base, one sample", time, 1000, "ns", 1e9);
+    let mut workspace = RegressorWorkspace::new(&case.model, &case.base);
+    let mut out = vec![0.0; case.model.n_joints() * case.base.len()];
+    let time = cpu_time(41, || {
+        for _ in 0..1000 {
+            torque_regressor_into(&case.model, &mut workspace, &state, &mut out);
+            black_box(&out);
+        }
+    });
+    line(
+        "regressor, base, one sample, workspace kept",
+        time,
+        1000,
+        "ns",
+        1e9,
+    );
+}
+
+/// Twin: `pin_native` regressor_call times the samples, plus `cond_eigen` Gram + SelfAdjointEigenSolver.
+fn condition(case: &Case) {
+    let weights = vec![1.0; case.model.n_joints()];
+    for n_samples in [100, 1000, 10_000] {
+        let states = case.states(n_samples);
+        let information = || information_matrix(&case.model, &case.base, &states, &weights);
+        let time = cpu_time(41, || {
+            black_box(information());
+        });
+        line(
+            &format!("information matrix, {n_samples} samples"),
+            time,
+            1,
+            "ms",
+            1e3,
+        );
+        let time = cpu_time(41, || {
+            let eigenvalues = information()
+                .self_adjoint_eigenvalues(Side::Lower)
+                .expect("finite");
+            black_box((eigenvalues[eigenvalues.len() - 1] / eigenvalues[0]).sqrt());
+        });
+        line(
+            &format!("states to cond, {n_samples} samples"),
+            time,
+            1,
+            "ms",
+            1e3,
+        );
+    }
+}
+
+/// Gradient of two eigenvalues (log cond), and of a general contraction without its weights.
+fn gradient(case: &Case) {
+    let states = case.states(SAMPLES);
+    let weights = vec![1.0; case.model.n_joints()];
+    let v: Vec<f64> = (0..case.base.len()).map(|k| (k as f64).sin()).collect();
+    let time = cpu_time(41, || {
+        let terms = [(1.0, &v[..]), (-1.0, &v)];
+        black_box(squared_torque_gradient(
+            &case.model,
+            &case.base,
+            &states,
+            &weights,
+            &terms,
+        ));
+    });
+    line("gradient of two eigenvalues", time, SAMPLES, "ns", 1e9);
+    let time = cpu_time(41, || {
+        black_box(regressor_contraction_gradient(
+            &case.model,
+            &case.base,
+            &states,
+            |y, g| {
+                black_box((y, g));
+            },
+        ));
+    });
+    line(
+        "gradient of a contraction, weights given",
+        time,
+        SAMPLES,
+        "ns",
+        1e9,
+    );
 }
