@@ -42,6 +42,7 @@ pub mod doctor;
 mod error;
 mod filter;
 mod finder;
+pub mod formats;
 mod harmonics;
 mod header;
 mod join;
