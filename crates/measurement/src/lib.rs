@@ -29,7 +29,9 @@
 //! # Ok::<(), idim_measurement::Error>(())
 //! ```
 //!
-//! It does not decide how a log is filtered: the caller does, and every choice is recorded ([`Choice`]).
+//! [`formats::read_log`] reads any format by the file's ending; [`doctor::examine_log`] says what is wrong with a
+//! recording before anything is computed from it. Neither decides how a log is filtered: the caller does, and every
+//! choice is recorded ([`Choice`]).
 
 mod clock;
 mod columns;
