@@ -1,20 +1,22 @@
 //! The best Fourier motion for the torque model (Radkhah, Kulić & Croft, sections II.D and III.B).
 
-use crate::fourier_chart::Chart;
-use crate::fourier_options::check;
-use crate::fourier_rounds::run_rounds;
+use crate::fourier_rounds::{Outcome, run_rounds, try_at_random};
 use crate::fourier_search::Task;
 use crate::{Conditioning, Error, FourierOptions};
 use idim_model::{Columns, Model};
 use idim_trajectory::{Certificate, FourierSeries, Limits};
 use std::sync::atomic::AtomicBool;
 
+/// A report looks at this many times the samples of a search: between them nothing is hidden from it.
+const REPORT_REFINEMENT: usize = 10;
+
 /// A motion inside all limits at every instant, and how good it is.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FourierDesign {
     /// The motion.
     pub series: FourierSeries,
-    /// Every criterion of its regressor as it is, over the samples of one period: no noise, nothing known before.
+    /// Every criterion of its regressor as it is, no noise and nothing known before, over ten times the samples of the
+    /// search.
     pub conditioning: Conditioning,
     /// Largest use of each limit; always certified.
     pub certificate: Certificate,
@@ -81,32 +83,41 @@ pub fn optimise_fourier_watched(
     options: &FourierOptions,
     watch: &FourierWatch<'_>,
 ) -> Result<FourierDesign, Error> {
-    let criteria = check(model, columns, limits, options)?;
-    let task = Task {
-        model,
-        columns,
-        criteria,
-        limits,
-        options,
-        chart: Chart::new(limits, options.n_harmonics, options.period, &options.ends),
-        stop: watch.stop,
-    };
-    let outcome = run_rounds(&task, watch.progress);
+    let task = Task::new(model, columns, limits, options, watch.stop)?;
+    design(&task, run_rounds(&task, watch.progress))
+}
+
+/// The best of `n_motions` random motions under the same limits: what a search has to beat.
+///
+/// # Errors
+/// As [`optimise_fourier`].
+pub fn best_random_fourier(
+    model: &Model,
+    columns: &Columns,
+    limits: &Limits,
+    options: &FourierOptions,
+    n_motions: usize,
+) -> Result<FourierDesign, Error> {
+    let stop = AtomicBool::new(false);
+    let task = Task::new(model, columns, limits, options, &stop)?;
+    design(&task, try_at_random(&task, n_motions))
+}
+
+fn design(task: &Task<'_>, outcome: Outcome) -> Result<FourierDesign, Error> {
+    let options = task.options;
     let Some(best) = outcome.best.into_iter().next() else {
         return Err(Error::NoFeasibleMotion {
-            starts: options.n_starts,
+            starts: outcome.values.len(),
             rule: "give more starts, or wider limits".into(),
         });
     };
+    let n_samples = REPORT_REFINEMENT * options.n_samples;
+    let values = outcome.values.iter();
     Ok(FourierDesign {
-        conditioning: series_conditioning(model, columns, &best.series, options.n_samples),
+        conditioning: series_conditioning(task.model, task.columns, &best.series, n_samples),
         series: best.series,
         certificate: best.certificate,
-        values: outcome
-            .values
-            .iter()
-            .map(|&v| options.value_of_logarithm(v))
-            .collect(),
+        values: values.map(|&v| options.value_of_logarithm(v)).collect(),
         n_rounds: outcome.n_rounds,
         n_evaluations: outcome.n_evaluations,
     })

@@ -188,10 +188,12 @@ impl Bounds {
     /// The motion with its certificate, drawn in by what it exceeds the limits between the instants of the bounds.
     pub(crate) fn certified(&self, x: &[f64]) -> Option<(FourierSeries, Certificate)> {
         let mut x = x.to_vec();
-        let none = JointBounds::none(self.chart.width());
         let mut exceeded = Self {
-            joints: vec![none; self.joints.len()],
-            ..self.clone()
+            period: self.period,
+            n_harmonics: self.n_harmonics,
+            limits: self.limits.clone(),
+            chart: self.chart.clone(),
+            joints: vec![JointBounds::none(self.chart.width()); self.joints.len()],
         };
         for _ in 0..MAX_DRAWS {
             let c = self.chart.coefficients(&x);

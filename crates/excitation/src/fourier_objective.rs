@@ -5,12 +5,10 @@
 
 use crate::FourierOptions;
 use crate::fourier_contraction::Contraction;
+use crate::information::information_matrix;
 use crate::spectrum::{SmoothCriterion, SpectralPoint};
-use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::{Accum, Mat, Par};
-use idim_model::{
-    Columns, JointStates, Model, regressor_contraction_gradient, visit_torque_regressor,
-};
+use faer::Mat;
+use idim_model::{Columns, JointStates, Model, regressor_contraction_gradient};
 use idim_trajectory::FourierBasis;
 
 /// The function an optimiser lowers: coefficients (joint after joint) to a weighted sum of criteria's logarithms.
@@ -21,14 +19,11 @@ pub(crate) struct FourierObjective<'a> {
     criteria: Vec<(f64, SmoothCriterion)>,
     basis: FourierBasis,
     contraction: Contraction,
-    /// Inverse noise of each joint's torque, relative.
-    joint_scale: Vec<f64>,
+    /// The diagonal of `D`: inverse squared noise of each joint's torque.
+    joint_weights: Vec<f64>,
     /// What earlier logs tell, in units of this motion's samples.
     prior: Option<Mat<f64>>,
     states: JointStates,
-    /// Stacked rows over the noise, joint after joint: row `joint · n_samples + sample`, so that lanes lie together.
-    w: Mat<f64>,
-    information: Mat<f64>,
     points: Vec<SpectralPoint>,
     n_evaluations: usize,
 }
@@ -40,11 +35,10 @@ impl<'a> FourierObjective<'a> {
         criteria: &[(f64, SmoothCriterion)],
         options: &FourierOptions,
     ) -> Self {
-        let n_rows = model.n_joints() * options.n_samples;
-        let joint_scale: Vec<f64> = if options.torque_noise.is_empty() {
+        let joint_weights = if options.torque_noise.is_empty() {
             vec![1.0; model.n_joints()]
         } else {
-            options.torque_noise.iter().map(|s| 1.0 / s).collect()
+            options.torque_noise.iter().map(|s| 1.0 / (s * s)).collect()
         };
         let prior = options.prior_information.as_ref();
         Self {
@@ -54,11 +48,9 @@ impl<'a> FourierObjective<'a> {
             criteria: criteria.to_vec(),
             basis: FourierBasis::equispaced(options.period, options.n_harmonics, options.n_samples),
             contraction: Contraction::new(model, columns),
-            joint_scale,
+            joint_weights,
             prior: prior.map(|a| faer::Scale(options.n_samples as f64) * a),
             states: JointStates::zeros(model.n_joints(), options.n_samples),
-            w: Mat::zeros(n_rows, columns.len()),
-            information: Mat::zeros(columns.len(), columns.len()),
             points: Vec::new(),
             n_evaluations: 0,
         }
@@ -81,15 +73,13 @@ impl<'a> FourierObjective<'a> {
     /// Weighted sum of the logarithms; infinite where columns are dependent.
     pub(crate) fn value(&mut self, coefficients: &[f64]) -> f64 {
         self.n_evaluations += 1;
-        self.fill_rows(coefficients);
-        let (a, w) = (self.information.as_mut(), self.w.as_ref());
-        let (full, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
-        let wt = w.transpose();
-        matmul(a, lower, Accum::Replace, wt, full, w, full, 1.0, Par::Seq);
+        self.basis.states_into(coefficients, &mut self.states);
+        let weights = &self.joint_weights;
+        let mut information = information_matrix(self.model, self.columns, &self.states, weights);
         if let Some(prior) = &self.prior {
-            self.information += prior;
+            information += prior;
         }
-        let (a, n) = (self.information.as_ref(), self.basis.n_samples());
+        let (a, n) = (information.as_ref(), self.basis.n_samples());
         self.points = self.criteria.iter().map(|(_, c)| c.at(a, n)).collect();
         let terms = self.criteria.iter().zip(&self.points);
         terms.map(|((weight, _), point)| weight * point.value).sum()
@@ -102,32 +92,13 @@ impl<'a> FourierObjective<'a> {
         for ((weight, criterion), point) in self.criteria.iter().zip(&self.points) {
             s += faer::Scale(2.0 * weight) * criterion.by_information(point);
         }
-        let weights: Vec<f64> = self.joint_scale.iter().map(|s| s * s).collect();
         self.contraction.set_matrix(s.as_ref());
-        let contraction = &self.contraction;
+        let (contraction, weights) = (&self.contraction, &self.joint_weights);
         let by_states =
             regressor_contraction_gradient(self.model, self.columns, &self.states, |y, g| {
-                contraction.contract(y, &weights, g);
+                contraction.contract(y, weights, g);
             });
         self.basis.pull_back(&by_states)
-    }
-
-    fn fill_rows(&mut self, coefficients: &[f64]) {
-        self.basis.states_into(coefficients, &mut self.states);
-        let n = self.states.n_samples();
-        let (w, scale) = (&mut self.w, &self.joint_scale);
-        visit_torque_regressor(self.model, self.columns, &self.states, |block| {
-            let (first, count) = (block.first_sample(), block.n_samples());
-            for column in 0..block.n_columns() {
-                let out = w.col_as_slice_mut(column);
-                for (joint, scale) in scale.iter().enumerate() {
-                    let out = &mut out[joint * n + first..][..count];
-                    for (o, value) in out.iter_mut().zip(block.lanes(joint, column)) {
-                        *o = scale * value;
-                    }
-                }
-            }
-        });
     }
 }
 

@@ -13,7 +13,7 @@ const START_USE: f64 = 0.7;
 /// Later searches start beside this many of the best motions in turn.
 const N_PARENTS: usize = 3;
 /// And this far from them: standard deviation of every coefficient over its typical size.
-const DISTANCE: f64 = 0.1;
+const DISTANCE: f64 = 0.15;
 
 /// What the searches came to.
 pub(crate) struct Outcome {
@@ -26,6 +26,15 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
+    fn empty() -> Self {
+        Self {
+            best: Vec::new(),
+            values: Vec::new(),
+            n_rounds: 0,
+            n_evaluations: 0,
+        }
+    }
+
     fn add(&mut self, searches: Vec<Search>) {
         for search in searches {
             self.n_evaluations += search.n_evaluations;
@@ -40,14 +49,25 @@ impl Outcome {
     }
 }
 
+/// Value of many random motions, each drawn in to meet the limits, and the best of them.
+pub(crate) fn try_at_random(task: &Task<'_>, n_motions: usize) -> Outcome {
+    let searches = (0..n_motions)
+        .into_par_iter()
+        .map(|place| {
+            let seed = rng(task.options.seed, usize::MAX, place).random();
+            let (n_harmonics, period) = (task.options.n_harmonics, task.options.period);
+            let series = random_series(task.limits, n_harmonics, period, seed);
+            task.evaluate(&series.coefficients())
+        })
+        .collect();
+    let mut outcome = Outcome::empty();
+    outcome.add(searches);
+    outcome
+}
+
 /// Runs all rounds, or those a stop leaves time for.
 pub(crate) fn run_rounds(task: &Task<'_>, progress: &(dyn Fn(&FourierProgress) + Sync)) -> Outcome {
-    let mut outcome = Outcome {
-        best: Vec::new(),
-        values: Vec::new(),
-        n_rounds: 0,
-        n_evaluations: 0,
-    };
+    let mut outcome = Outcome::empty();
     let lowest = Mutex::new(f64::INFINITY);
     for round in 0..=task.options.n_rounds {
         if round > 0 && (task.stopped() || outcome.best.is_empty()) {

@@ -1,11 +1,12 @@
 //! One search for a Fourier motion: through ever sharper criteria and barriers to a certificate.
 
-use crate::FourierOptions;
 use crate::fourier_chart::Chart;
 use crate::fourier_interior::Interior;
 use crate::fourier_limits::Bounds;
 use crate::fourier_objective::FourierObjective;
+use crate::fourier_options::check;
 use crate::spectrum::SmoothCriterion;
+use crate::{Error, FourierOptions};
 use idim_model::{Columns, Model};
 use idim_trajectory::{Certificate, FourierSeries, Limits};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,19 +23,19 @@ pub(crate) struct Schedule {
     sharp_stage: usize,
 }
 
-/// From anywhere. At the last stage the norms are within 1 % of the eigenvalues and the barrier costs below 0.1 %.
+/// From anywhere. At the last stage the norms are within 2 % of the eigenvalues and the barrier costs below 0.1 %.
 pub(crate) const EXPLORE: Schedule = Schedule {
     power: 4.0,
     barrier: 3e-3,
     n_stages: 10,
     sharp_stage: 4,
 };
-/// From beside a good motion: a barrier as weak as it was on the way there, so that it does not lead back.
+/// From beside a good motion: sharper from the start, so that not all of it is lost on the way.
 pub(crate) const REVISIT: Schedule = Schedule {
-    power: 13.5,
-    barrier: 3e-4,
-    n_stages: 7,
-    sharp_stage: 2,
+    power: 6.0,
+    barrier: 1e-3,
+    n_stages: 8,
+    sharp_stage: 3,
 };
 /// From a good motion: the last tenths of a percent.
 pub(crate) const FINISH: Schedule = Schedule {
@@ -44,9 +45,9 @@ pub(crate) const FINISH: Schedule = Schedule {
     sharp_stage: 0,
 };
 /// Growth of the power and decay of the barrier from stage to stage.
-const SHARPENING: [f64; 2] = [1.5, 0.5];
+const SHARPENING: [f64; 2] = [1.4, 0.5];
 /// Steps of a stage: what is left over, the next one does as well.
-const MAX_STEPS: usize = 30;
+const MAX_STEPS: usize = 15;
 /// A stage ends when a step promises less than this share of what the smoothing still hides.
 const STAGE_TOLERANCE: f64 = 0.1;
 /// A start comes this near to the limits at most: the barrier is infinite on them.
@@ -80,7 +81,25 @@ pub(crate) struct Search {
     pub(crate) n_evaluations: usize,
 }
 
-impl Task<'_> {
+impl<'a> Task<'a> {
+    pub(crate) fn new(
+        model: &'a Model,
+        columns: &'a Columns,
+        limits: &'a Limits,
+        options: &'a FourierOptions,
+        stop: &'a AtomicBool,
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            criteria: check(model, columns, limits, options)?,
+            chart: Chart::new(limits, options.n_harmonics, options.period, &options.ends),
+            model,
+            columns,
+            limits,
+            options,
+            stop,
+        })
+    }
+
     pub(crate) fn stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
@@ -95,10 +114,24 @@ impl Task<'_> {
         )
     }
 
+    /// These coefficients as they are, but for what exceeds the limits.
+    pub(crate) fn evaluate(&self, c: &[f64]) -> Search {
+        let mut objective = self.objective();
+        let found = self.bounds().certified(&self.chart.variables(c));
+        let found = found.and_then(|found| valued(&mut objective, found));
+        Search {
+            found,
+            n_evaluations: objective.n_evaluations(),
+        }
+    }
+
+    fn objective(&self) -> FourierObjective<'_> {
+        FourierObjective::new(self.model, self.columns, &self.criteria, self.options)
+    }
+
     /// Searches from these coefficients; told to stop, it returns what it has.
     pub(crate) fn search(&self, start: &[f64], schedule: Schedule) -> Search {
-        let mut objective =
-            FourierObjective::new(self.model, self.columns, &self.criteria, self.options);
+        let mut objective = self.objective();
         let (mut power, mut barrier) = (schedule.power, schedule.barrier);
         objective.smooth(Some(power));
         let x = self.chart.variables(start);
@@ -150,16 +183,24 @@ impl Task<'_> {
 
 /// Keeps where the search stands if it can be certified and is better than what was kept before.
 fn keep_better(descent: &mut Interior<'_, '_>, best: &mut Option<Found>) {
-    let Some((series, certificate)) = descent.bounds.certified(&descent.x) else {
-        return;
-    };
+    let found = descent.bounds.certified(&descent.x);
     descent.objective.smooth(None);
-    let value = descent.objective.value(&series.coefficients());
-    if value.is_finite() && best.as_ref().is_none_or(|b| value < b.value) {
-        *best = Some(Found {
-            series,
-            certificate,
-            value,
-        });
+    if let Some(found) = found.and_then(|found| valued(descent.objective, found))
+        && best.as_ref().is_none_or(|b| found.value < b.value)
+    {
+        *best = Some(found);
     }
+}
+
+/// The motion with its value, unless columns are dependent.
+fn valued(
+    objective: &mut FourierObjective<'_>,
+    (series, certificate): (FourierSeries, Certificate),
+) -> Option<Found> {
+    let value = objective.value(&series.coefficients());
+    value.is_finite().then_some(Found {
+        series,
+        certificate,
+        value,
+    })
 }

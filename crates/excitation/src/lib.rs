@@ -48,6 +48,7 @@ mod fourier_rounds;
 mod fourier_search;
 mod information;
 mod padded;
+mod point_descent;
 mod point_moves;
 mod point_objective;
 mod point_rows;
@@ -63,8 +64,8 @@ mod spectrum;
 pub use criterion::{ConditionNumbers, Conditioning, Criterion, Equilibrium, Scaling};
 pub use error::Error;
 pub use fourier::{
-    FourierDesign, FourierProgress, FourierWatch, optimise_fourier, optimise_fourier_watched,
-    series_conditioning,
+    FourierDesign, FourierProgress, FourierWatch, best_random_fourier, optimise_fourier,
+    optimise_fourier_watched, series_conditioning,
 };
 pub use fourier_options::{FourierEnds, FourierOptions};
 pub use information::information_matrix;

@@ -36,6 +36,8 @@ enum Smooth {
 #[derive(Debug, Clone)]
 struct EntryBound {
     limit: f64,
+    /// Share of the limit that is aimed at.
+    aim: f64,
     weight: f64,
     /// One an entry of the padded `W`.
     multipliers: Vec<f64>,
@@ -74,6 +76,7 @@ impl<'a> PointObjective<'a> {
             by_rows: vec![0.0; n_entries],
             entries: limit_of_equilibrium.map(|limit| EntryBound {
                 limit,
+                aim: 1.0,
                 weight: 0.0,
                 multipliers: vec![0.0; n_entries],
             }),
@@ -144,7 +147,7 @@ impl<'a> PointObjective<'a> {
         criterion.evaluate(self.rows.matrix().as_ref(), self.n_rows)
     }
 
-    /// `S` of the rows last computed over its limit, at most one when it is held; zero without a limit.
+    /// By how much of its limit `S` of the rows last computed exceeds it; zero where it is held and without one.
     pub(crate) fn excess_of_equilibrium(&self) -> f64 {
         let Some(entries) = &self.entries else {
             return 0.0;
@@ -155,7 +158,14 @@ impl<'a> PointObjective<'a> {
             .chunks_exact(stride)
             .flat_map(|row| &row[..self.n_columns])
             .fold(f64::INFINITY, |a, w| a.min(w.abs()));
-        largest_entry(w).1 / smallest / entries.limit
+        (largest_entry(w).1 / smallest / entries.limit - 1.0).max(0.0)
+    }
+
+    /// Share of the limit of `S` that is aimed at from now on.
+    pub(crate) fn set_aim(&mut self, aim: f64) {
+        if let Some(entries) = &mut self.entries {
+            entries.aim = aim;
+        }
     }
 
     /// Starts over with the weight of the bound on the entries of `W`.
@@ -170,7 +180,7 @@ impl<'a> PointObjective<'a> {
     pub(crate) fn update_multipliers(&mut self) {
         if let Some(entries) = &mut self.entries {
             let w = self.rows.w();
-            let smallest = largest_entry(w).1 / entries.limit;
+            let smallest = largest_entry(w).1 / (entries.aim * entries.limit);
             for (multiplier, w) in entries.multipliers.iter_mut().zip(w) {
                 let violation = 1.0 - w.abs() / smallest;
                 *multiplier = (*multiplier + entries.weight * violation).max(0.0);
@@ -187,7 +197,8 @@ impl EntryBound {
         }
         let stride = padded::stride(n_columns);
         let (at, largest) = largest_entry(w);
-        let smallest = largest / self.limit;
+        let limit = self.aim * self.limit;
+        let smallest = largest / limit;
         let (mut value, mut by_smallest) = (0.0, 0.0);
         for i in (0..w.len()).filter(|i| i % stride < n_columns) {
             let multiplier = self.multipliers[i];
@@ -196,7 +207,7 @@ impl EntryBound {
             by_rows[i] -= active * w[i].signum() / smallest;
             by_smallest += active * w[i].abs() / (smallest * smallest);
         }
-        by_rows[at] += by_smallest * w[at].signum() / self.limit;
+        by_rows[at] += by_smallest * w[at].signum() / limit;
         value
     }
 }

@@ -7,6 +7,8 @@ pub(crate) struct Schedule {
     pub(crate) phases: &'static [(u32, f64)],
     /// Descents at the last phase after the multipliers of that bound have moved.
     pub(crate) n_updates: usize,
+    /// Times this is done, each time aiming lower, until `S` is held.
+    pub(crate) n_attempts: usize,
     /// A descent stops when twenty iterations lower the logarithm by less.
     pub(crate) tolerance: f64,
     pub(crate) max_iterations: usize,
@@ -27,18 +29,21 @@ pub(crate) const FREE: Schedules = Schedules {
     coarse: Schedule {
         phases: &[(3, 0.0), (5, 0.0)],
         n_updates: 0,
+        n_attempts: 0,
         tolerance: 1e-2,
         max_iterations: 300,
     },
     fine: Schedule {
         phases: &[(4, 0.0), (6, 0.0), (8, 0.0)],
         n_updates: 0,
+        n_attempts: 0,
         tolerance: 2e-3,
         max_iterations: 300,
     },
     polish: Schedule {
         phases: &[(8, 0.0), (9, 0.0), (10, 0.0), (11, 0.0)],
         n_updates: 0,
+        n_attempts: 0,
         tolerance: 1e-6,
         max_iterations: 3000,
     },
@@ -59,18 +64,21 @@ pub(crate) const LIMITED: Schedules = Schedules {
             (7, 1.0),
         ],
         n_updates: 4,
+        n_attempts: 1,
         tolerance: 1e-3,
         max_iterations: 300,
     },
     fine: Schedule {
         phases: &[(6, 0.1), (6, 0.5), (7, 1.0)],
         n_updates: 4,
+        n_attempts: 1,
         tolerance: 1e-3,
         max_iterations: 300,
     },
     polish: Schedule {
         phases: &[(8, 1.0), (9, 1.0), (10, 1.0)],
         n_updates: 8,
+        n_attempts: 4,
         tolerance: 1e-4,
         max_iterations: 1000,
     },

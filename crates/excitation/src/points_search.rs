@@ -1,6 +1,6 @@
 //! Points for the energy model by exact gradients: many starts, then a pool that is disturbed and descends again.
 
-use crate::box_lbfgs::{BoxOptions, minimise_in_box};
+use crate::point_descent::{Candidate, sort};
 use crate::point_moves::{disturb, random_start};
 use crate::point_objective::PointObjective;
 use crate::point_schedule::{FREE, LIMITED, Schedule, Schedules};
@@ -8,7 +8,7 @@ use crate::{Criterion, EnergyDesign, Error, PointDesign, Scaling};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 
 /// How points are searched for with exact gradients.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,7 +34,8 @@ pub struct SearchProgress {
     pub n_done: usize,
     /// Rounds of the whole search.
     pub n_rounds: usize,
-    /// Best value of the criterion so far.
+    /// Best value of the criterion so far; made worse by what exceeds a limit of `S`, which comes in after a quarter of
+    /// the rounds.
     pub best: f64,
 }
 
@@ -44,18 +45,17 @@ const ROUND: usize = 16;
 const POOL: usize = 10;
 /// The best of them that are taken to the bottom: the order may still change by a percent there.
 const POLISHED: usize = 4;
-
-/// Share of the limit of `S` that is aimed at: the last update of the multipliers leaves some excess.
-const AIM: f64 = 0.997;
-/// What exceeding the limit of `S` by all of it costs during the search, in multiples of the criterion.
-const COST_OF_EXCESS: f64 = 5.0;
-/// Pairs that a descent remembers; more cost as much as the function itself.
-const MEMORY: usize = 20;
+/// With `S` limited, one round in this many comes first without the limit: good chains that it is then imposed on
+/// are far better than what it leaves of random ones.
+const FREE_ROUNDS: usize = 4;
+/// With `S` limited, one descent in this many starts again from a chain found without the limit.
+const IMPOSED: usize = 4;
 
 /// Lowers a smooth criterion over chained points from many starts with exact gradients and limits as a box.
 ///
 /// Same points for the same seed and rounds, whatever the number of threads. `progress` is asked after every round
-/// whether to go on; after `Break` the best so far is returned.
+/// whether to go on; after `Break` the best so far is returned. Whether `S` is within its limit is to be read from
+/// the result: points that hold it are preferred to all others.
 ///
 /// # Errors
 /// A criterion without a gradient, no start, fewer rows than base columns, a limit of `S` that is not above one.
@@ -64,71 +64,33 @@ pub fn search_points(
     options: &PointSearchOptions,
     progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
 ) -> Result<PointDesign, Error> {
-    let objective = check(design, options)?;
-    let starts: Vec<(Candidate, f64)> = (0..options.n_starts)
-        .into_par_iter()
-        .map(|start| fresh(design, objective.clone(), options, start as u64))
-        .collect();
-    let initial_conditions = starts.iter().map(|s| s.1).collect();
-    let mut n_evaluations: usize = starts.iter().map(|s| s.0.n_evaluations).sum();
-    let mut pool: Vec<Candidate> = starts.into_iter().map(|s| s.0).collect();
-    sort(&mut pool);
-    pool.truncate(POOL);
-    for round in 0..=options.n_rounds {
-        let told = progress(SearchProgress {
-            n_done: round,
-            n_rounds: options.n_rounds,
-            best: pool[0].merit,
-        });
-        if told.is_break() || round == options.n_rounds {
-            break;
+    let free = check(design, options, None)?;
+    let (mut search, initial_conditions) = Search::start(design, options, &free);
+    let n_free = match options.limit_of_equilibrium {
+        Some(_) => options.n_rounds / FREE_ROUNDS,
+        None => options.n_rounds,
+    };
+    let mut go_on = search.rounds(0..n_free, &free, &FREE, progress);
+    let mut objective = free;
+    if let Some(limit) = options.limit_of_equilibrium {
+        objective = check(design, options, Some(limit))?;
+        search.impose(&objective);
+        if go_on.is_continue() {
+            go_on = search.rounds(n_free..options.n_rounds, &objective, &LIMITED, progress);
         }
-        let children: Vec<(usize, Candidate)> = (0..ROUND)
-            .into_par_iter()
-            .map(|k| {
-                let stream = (options.n_starts + round * ROUND + k) as u64;
-                child(design, objective.clone(), options, &pool, stream)
-            })
-            .collect();
-        for (parent, child) in children {
-            n_evaluations += child.n_evaluations;
-            if child.merit < pool[parent].merit {
-                pool[parent] = child;
-            }
-        }
-        sort(&mut pool);
     }
-    pool.truncate(POLISHED);
-    let polished: Vec<Candidate> = pool
-        .into_par_iter()
-        .map(|c| {
-            let polished = Candidate::descend(
-                objective.clone(),
-                options,
-                c.x.clone(),
-                &schedules(options).polish,
-            );
-            if polished.merit < c.merit {
-                polished
-            } else {
-                c
-            }
-        })
-        .collect();
-    n_evaluations += polished.iter().map(|c| c.n_evaluations).sum::<usize>();
-    Ok(finish(
-        design,
-        objective,
-        options,
-        polished,
-        initial_conditions,
-        n_evaluations,
-    ))
+    if go_on.is_continue() {
+        // The last round is told of too; there is nothing left to stop.
+        let _ = progress(search.progress(options.n_rounds));
+    }
+    search.polish(&objective);
+    Ok(search.finish(objective, initial_conditions))
 }
 
 fn check<'a>(
     design: &'a EnergyDesign,
     options: &PointSearchOptions,
+    limit: Option<f64>,
 ) -> Result<PointObjective<'a>, Error> {
     let (rows, columns) = (options.n_rows, design.n_columns());
     if rows < columns {
@@ -150,8 +112,7 @@ fn check<'a>(
             "max|W| / min|W| is above one; give a larger limit or none",
         ));
     }
-    let limit = options.limit_of_equilibrium;
-    PointObjective::new(design, rows, options.criterion, limit.map(|l| AIM * l)).ok_or_else(|| {
+    PointObjective::new(design, rows, options.criterion, limit).ok_or_else(|| {
         Error::input(
             "criterion",
             format!("{:?}", options.criterion),
@@ -160,140 +121,177 @@ fn check<'a>(
     })
 }
 
-/// Variables of one set of points, in the box, and what they are worth.
-#[derive(Debug, Clone)]
-struct Candidate {
-    x: Vec<f64>,
-    /// The criterion, worse by what exceeds the limit of `S`.
-    merit: f64,
-    /// Whether that limit is held.
-    held: bool,
+/// What a search has so far.
+struct Search<'a> {
+    design: &'a EnergyDesign,
+    options: &'a PointSearchOptions,
+    /// Best first.
+    pool: Vec<Candidate>,
+    /// Where `S` is limited: what was found before it was.
+    without_limit: Vec<Candidate>,
     n_evaluations: usize,
 }
 
-impl Candidate {
-    fn descend(
-        mut objective: PointObjective<'_>,
-        options: &PointSearchOptions,
-        mut x: Vec<f64>,
+impl<'a> Search<'a> {
+    /// Random starts taken down, and the raw 2-norm condition each began with.
+    fn start(
+        design: &'a EnergyDesign,
+        options: &'a PointSearchOptions,
+        objective: &PointObjective<'_>,
+    ) -> (Self, Vec<f64>) {
+        let starts: Vec<(Candidate, f64)> = (0..options.n_starts)
+            .into_par_iter()
+            .map(|start| {
+                let x = random_start(design, options.n_rows, &mut stream(options.seed, start));
+                let mut objective = objective.clone();
+                let initial = objective.criterion(&x, Criterion::TwoNorm(Scaling::Raw));
+                let found = Candidate::descend(objective, options.criterion, x, &FREE.coarse);
+                (found, initial)
+            })
+            .collect();
+        let (mut pool, initial_conditions): (Vec<Candidate>, Vec<f64>) = starts.into_iter().unzip();
+        let n_evaluations = pool.iter().map(|c| c.n_evaluations).sum();
+        sort(&mut pool);
+        pool.truncate(POOL);
+        let search = Self {
+            design,
+            options,
+            pool,
+            without_limit: Vec::new(),
+            n_evaluations,
+        };
+        (search, initial_conditions)
+    }
+
+    fn progress(&self, n_done: usize) -> SearchProgress {
+        SearchProgress {
+            n_done,
+            n_rounds: self.options.n_rounds,
+            best: self.pool[0].merit,
+        }
+    }
+
+    /// Rounds of disturbed descents; each child stands against its parent.
+    fn rounds(
+        &mut self,
+        rounds: Range<usize>,
+        objective: &PointObjective<'_>,
+        schedules: &Schedules,
+        progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        for round in rounds {
+            progress(self.progress(round))?;
+            let children: Vec<(usize, Candidate)> = (0..ROUND)
+                .into_par_iter()
+                .map(|k| {
+                    let number = self.options.n_starts + round * ROUND + k;
+                    self.child(number, objective, schedules)
+                })
+                .collect();
+            for (parent, child) in children {
+                self.n_evaluations += child.n_evaluations;
+                if child.merit < self.pool[parent].merit {
+                    self.pool[parent] = child;
+                }
+            }
+            sort(&mut self.pool);
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// A disturbed member of the pool taken down, and which member.
+    fn child(
+        &self,
+        number: usize,
+        objective: &PointObjective<'_>,
+        schedules: &Schedules,
+    ) -> (usize, Candidate) {
+        let rng = &mut stream(self.options.seed, number);
+        let again = !self.without_limit.is_empty() && rng.random_range(0..IMPOSED) == 0;
+        let (family, schedule) = if again {
+            (&self.without_limit, &schedules.coarse)
+        } else {
+            (&self.pool, &schedules.fine)
+        };
+        let n = family.len();
+        // The better of two: the family is sorted.
+        let parent = rng.random_range(0..n).min(rng.random_range(0..n));
+        let other = rng.random_range(0..n);
+        let mut x = family[parent].x.clone();
+        let n_positions = self.design.position_variables().len();
+        let n_variables = self.design.n_variables();
+        disturb(&mut x, &family[other].x, n_positions, n_variables, rng);
+        let child = Candidate::descend(objective.clone(), self.options.criterion, x, schedule);
+        // One from outside the pool stands against the worst of it.
+        let against = if again { self.pool.len() - 1 } else { parent };
+        (against, child)
+    }
+
+    /// Takes the pool down again under the limit of `S`.
+    fn impose(&mut self, objective: &PointObjective<'_>) {
+        self.without_limit = std::mem::take(&mut self.pool);
+        self.pool = self.descend_all(&self.without_limit, objective, &LIMITED.coarse);
+        self.count_and_sort();
+    }
+
+    /// Takes the best of the pool to the bottom.
+    fn polish(&mut self, objective: &PointObjective<'_>) {
+        let schedules = match self.options.limit_of_equilibrium {
+            Some(_) => &LIMITED,
+            None => &FREE,
+        };
+        self.pool.truncate(POLISHED);
+        let before = std::mem::take(&mut self.pool);
+        self.pool = self.descend_all(&before, objective, &schedules.polish);
+        self.count_and_sort();
+        // Kept where polishing made nothing better; points that hold the limit come before all that do not.
+        self.pool.extend(before);
+        self.pool
+            .sort_by(|a, b| (!a.held).cmp(&!b.held).then(a.merit.total_cmp(&b.merit)));
+        self.pool.truncate(POLISHED);
+    }
+
+    fn descend_all(
+        &self,
+        from: &[Candidate],
+        objective: &PointObjective<'_>,
         schedule: &Schedule,
-    ) -> Self {
-        let settings = BoxOptions {
-            memory: MEMORY,
-            max_iterations: schedule.max_iterations,
-            tolerance: schedule.tolerance,
-        };
-        let mut power = 0;
-        let mut lower = |objective: &mut PointObjective<'_>, k: u32| {
-            minimise_in_box(
-                |x, g| objective.value_and_gradient(x, k, g),
-                &mut x,
-                &settings,
-            );
-        };
-        for &(k, weight) in schedule.phases {
-            objective.set_weight(weight);
-            lower(&mut objective, k);
-            power = k;
-        }
-        for _ in 0..schedule.n_updates {
-            objective.update_multipliers();
-            lower(&mut objective, power);
-        }
-        let criterion = objective.criterion(&x, options.criterion);
-        let excess = (AIM * objective.excess_of_equilibrium() - 1.0).max(0.0);
-        Self {
-            x,
-            merit: penalised(options.criterion, criterion, excess),
-            held: excess == 0.0,
-            n_evaluations: objective.n_evaluations(),
+    ) -> Vec<Candidate> {
+        from.par_iter()
+            .map(|c| {
+                let x = c.x.clone();
+                Candidate::descend(objective.clone(), self.options.criterion, x, schedule)
+            })
+            .collect()
+    }
+
+    fn count_and_sort(&mut self) {
+        self.n_evaluations += self.pool.iter().map(|c| c.n_evaluations).sum::<usize>();
+        sort(&mut self.pool);
+    }
+
+    fn finish(
+        self,
+        mut objective: PointObjective<'_>,
+        initial_conditions: Vec<f64>,
+    ) -> PointDesign {
+        let rng = &mut ChaCha8Rng::seed_from_u64(self.options.seed);
+        let points = self
+            .design
+            .points_of(objective.values(&self.pool[0].x), rng);
+        PointDesign {
+            conditioning: self.design.conditioning(&points),
+            points,
+            values: self.pool.iter().map(|c| c.merit).collect(),
+            initial_conditions,
+            n_evaluations: self.n_evaluations,
         }
     }
 }
 
-/// A random start taken down, and the raw 2-norm condition it began with.
-fn fresh(
-    design: &EnergyDesign,
-    mut objective: PointObjective<'_>,
-    options: &PointSearchOptions,
-    start: u64,
-) -> (Candidate, f64) {
-    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
-    rng.set_stream(start);
-    let x = random_start(design, options.n_rows, &mut rng);
-    let initial = objective.criterion(&x, Criterion::TwoNorm(Scaling::Raw));
-    (
-        Candidate::descend(objective, options, x, &schedules(options).coarse),
-        initial,
-    )
-}
-
-/// A disturbed member of the pool taken down, and which member.
-fn child(
-    design: &EnergyDesign,
-    objective: PointObjective<'_>,
-    options: &PointSearchOptions,
-    pool: &[Candidate],
-    stream: u64,
-) -> (usize, Candidate) {
-    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
-    rng.set_stream(stream);
-    // The better of two: the pool is sorted.
-    let parent = rng
-        .random_range(0..pool.len())
-        .min(rng.random_range(0..pool.len()));
-    let other = rng.random_range(0..pool.len());
-    let mut x = pool[parent].x.clone();
-    disturb(
-        &mut x,
-        &pool[other].x,
-        design.position_variables().len(),
-        design.n_variables(),
-        &mut rng,
-    );
-    (
-        parent,
-        Candidate::descend(objective, options, x, &schedules(options).fine),
-    )
-}
-
-fn schedules(options: &PointSearchOptions) -> &'static Schedules {
-    if options.limit_of_equilibrium.is_some() {
-        &LIMITED
-    } else {
-        &FREE
-    }
-}
-
-/// A criterion made worse: `log det` by adding, the others, all positive, by a factor.
-fn penalised(criterion: Criterion, value: f64, excess: f64) -> f64 {
-    // Entries that vanish make the excess infinite; the order among such points does not matter.
-    let factor = 1.0 + (COST_OF_EXCESS * excess).min(1e6);
-    criterion.value_of_logarithm(criterion.logarithm(value) + factor.ln())
-}
-
-fn sort(pool: &mut [Candidate]) {
-    pool.sort_by(|a, b| a.merit.total_cmp(&b.merit));
-}
-
-fn finish(
-    design: &EnergyDesign,
-    mut objective: PointObjective<'_>,
-    options: &PointSearchOptions,
-    mut pool: Vec<Candidate>,
-    initial_conditions: Vec<f64>,
-    n_evaluations: usize,
-) -> PointDesign {
-    sort(&mut pool);
-    // Points that hold the limit of S come before all that do not.
-    pool.sort_by_key(|c| !c.held);
-    let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
-    let points = design.points_of(objective.values(&pool[0].x), &mut rng);
-    PointDesign {
-        conditioning: design.conditioning(&points),
-        points,
-        values: pool.iter().map(|c| c.merit).collect(),
-        initial_conditions,
-        n_evaluations,
-    }
+/// Random numbers of one descent: the same whichever thread takes it.
+fn stream(seed: u64, number: usize) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(number as u64);
+    rng
 }
