@@ -107,22 +107,24 @@ pub fn regressor_contraction_gradient(
     over_lanes(model, states, |first, lanes, work| {
         y.move_to(first, states.n_samples());
         g.move_to(first, states.n_samples());
-        dispatch(Fill {
+        let fill = Fill {
             model,
             plan: &plan,
             state: lanes.state(),
             kinematics: &mut kinematics,
             rows: y.entries_mut(),
-        });
+        };
+        fill.run();
         weigh(&y, &mut g);
-        dispatch(RegressorContraction {
+        let contraction = RegressorContraction {
             model,
             plan: &plan,
             state: lanes.state(),
             kinematics: &kinematics,
             weights: g.entries(),
             work,
-        });
+        };
+        contraction.run();
     })
 }
 
@@ -346,6 +348,14 @@ struct RegressorContraction<'a, T> {
     kinematics: &'a Kinematics<T>,
     weights: &'a [T],
     work: &'a mut Workspace<T>,
+}
+
+impl RegressorContraction<'_, F64x8> {
+    /// Compiled here once, as [`Fill::run`] is.
+    #[inline(never)]
+    fn run(self) {
+        dispatch(self);
+    }
 }
 
 impl<T: Lane> pulp::WithSimd for RegressorContraction<'_, T> {

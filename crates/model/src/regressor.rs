@@ -233,13 +233,14 @@ impl BlockFiller {
     ) {
         block.move_to(first, states.n_samples());
         self.lanes.load(states, first);
-        dispatch(Fill {
+        let fill = Fill {
             model,
             plan: &self.plan,
             state: self.lanes.state(),
             kinematics: &mut self.kinematics,
             rows: &mut block.entries,
-        });
+        };
+        fill.run();
     }
 }
 
@@ -273,6 +274,14 @@ pub(crate) struct Fill<'a, T> {
     pub(crate) state: [&'a [T]; 3],
     pub(crate) kinematics: &'a mut Kinematics<T>,
     pub(crate) rows: &'a mut [T],
+}
+
+impl Fill<'_, F64x8> {
+    /// Compiled here once: a generic caller would otherwise be compiled with all of it in every crate.
+    #[inline(never)]
+    pub(crate) fn run(self) {
+        dispatch(self);
+    }
 }
 
 impl<T: Lane> pulp::WithSimd for Fill<'_, T> {
