@@ -67,7 +67,9 @@ pub use regressor::{
     BlockFiller, RegressorBlock, RegressorWorkspace, observation_matrix, torque_regressor,
     torque_regressor_into, visit_torque_regressor,
 };
-pub use robot::{Actuator, Joint, JointKind, JointLimits, Link, Robot};
+pub use robot::{
+    Actuator, Coupling, Drives, Joint, JointKind, JointLimits, KnownTorque, Link, LogSide, Robot,
+};
 pub use robot_file::{robot_from_ron, robot_to_ron};
 pub use states::{JointState, JointStates, random_states};
 pub use urdf::{robot_from_urdf, robot_from_urdf_with};

@@ -7,6 +7,11 @@ use crate::suggestion::did_you_mean;
 use nalgebra::Vector3;
 
 mod check;
+mod drives;
+mod known_torque;
+
+pub use drives::{Coupling, Drives, LogSide};
+pub use known_torque::KnownTorque;
 
 /// How a joint moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,6 +46,8 @@ pub struct Actuator {
     pub rotor_inertia: Option<f64>,
     /// Encoder counts per motor turn, after quadrature.
     pub encoder_counts: Option<f64>,
+    /// Joint coordinate where the motor reads zero, rad (m); 0 where not stated.
+    pub zero: Option<f64>,
     /// Viscous friction at the joint, N·m·s/rad: the truth of a simulation.
     pub viscous_friction: Option<f64>,
     /// Coulomb friction at the joint, N·m: the truth of a simulation.
@@ -88,6 +95,7 @@ pub struct Robot {
     gravity: Vector3<f64>,
     joints: Vec<Joint>,
     links: Vec<Link>,
+    drives: Drives,
     notes: Vec<String>,
 }
 
@@ -108,6 +116,7 @@ impl Robot {
             gravity,
             joints,
             links,
+            drives: Drives::default(),
             notes: Vec::new(),
         };
         robot.check()?;
@@ -185,6 +194,8 @@ impl Robot {
         let held = robot.joints.remove(joint);
         let link = robot.links.remove(joint);
         let parent_from_link = held.pose(position);
+        robot.turn_coupled_motors(joint, position - held.actuator.zero.unwrap_or(0.0));
+        robot.drives = self.drives.without(joint);
         for j in &mut robot.joints {
             match j.parent {
                 Some(p) if p == joint => {

@@ -1,6 +1,7 @@
 //! Robots from RON text and back; `docs/robot-file.md` describes the format.
 
 pub(crate) mod assembly;
+mod drives;
 mod format;
 mod frames;
 mod plausibility;
@@ -63,7 +64,9 @@ pub fn robot_from_ron(text: &str) -> Result<Robot, Error> {
     }?;
     let gravity = Vector3::from(file.gravity.map(|v| v.0));
     let robot = assemble(&file.name, gravity, described)?;
-    Ok(robot.with_notes(snapping.into_notes()))
+    let known = &file.known_torques;
+    let drives = drives::drives(&file.joints, file.log, known, file.angles, &robot)?;
+    Ok(robot.with_drives(drives)?.with_notes(snapping.into_notes()))
 }
 
 /// The joints of a file one after another, each with its place in the text.
@@ -148,7 +151,7 @@ fn describe_joint<F: Frame>(
         offset: frame.offset,
         joint_from_link: frame.joint_from_link,
         limits: limits(entry.limits.as_ref(), kind, reader.unit),
-        actuator: actuator(entry.actuator.as_ref()),
+        actuator: actuator(entry.actuator.as_ref(), kind, reader.unit),
     };
     let link = Link {
         name: entry

@@ -119,6 +119,15 @@ impl Joint {
                 ));
             }
         }
+        if let Some(v) = self.actuator.zero
+            && !v.is_finite()
+        {
+            return Err(Error::robot(
+                place,
+                format!("zero {v}"),
+                "give a finite number",
+            ));
+        }
         if let Some(v) = self.actuator.gear_ratio
             && !(v != 0.0 && v.is_finite())
         {

@@ -1,6 +1,7 @@
 //! What a robot file may say, as serde reads it; `docs/robot-file.md` is its description for people.
 
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// A finite number: `NaN` and `inf` are refused where they stand.
 #[derive(Debug, Clone, Copy, Deserialize, Serialize)]
@@ -52,7 +53,40 @@ pub(super) struct File {
     pub(super) gravity: [Number; 3],
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) base: Option<Base>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) log: Option<LogSides>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) known_torques: Vec<Known>,
     pub(super) joints: Joints,
+}
+
+/// The side of the gears the robot's logs stand on.
+#[derive(Debug, Clone, Copy, Default, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, default, rename = "Log")]
+pub(super) struct LogSides {
+    pub(super) positions: Side,
+    pub(super) torques: Side,
+}
+
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]
+pub(super) enum Side {
+    #[default]
+    Joint,
+    Motor,
+}
+
+/// A torque known up to its scale: a table `(q, torque)`, or a formula of `q` with its named quantities.
+#[derive(Debug, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, rename = "KnownTorque")]
+pub(super) struct Known {
+    pub(super) name: String,
+    pub(super) joint: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) table: Option<Vec<[Number; 2]>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) with: Vec<(String, String)>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) formula: Option<String>,
 }
 
 /// Unit of every angle, angular speed and angular acceleration of the file.
@@ -170,6 +204,10 @@ pub(super) struct Drive {
     pub(super) rotor_inertia: Option<Number>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) encoder_counts: Option<Number>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) zero: Option<Number>,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub(super) coupled: BTreeMap<String, Number>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) viscous_friction: Option<Number>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -5,6 +5,7 @@ use super::frames::radians;
 use crate::parameter::InertialParameters;
 use crate::robot::{Actuator, JointKind, JointLimits};
 use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
 
 /// Angles of a revolute joint in the file's unit, lengths of a prismatic one in metres.
 pub(super) fn limits(limits: Option<&Limits>, kind: JointKind, unit: AngleUnit) -> JointLimits {
@@ -23,7 +24,7 @@ pub(super) fn limits(limits: Option<&Limits>, kind: JointKind, unit: AngleUnit) 
     }
 }
 
-pub(super) fn actuator(drive: Option<&Drive>) -> Actuator {
+pub(super) fn actuator(drive: Option<&Drive>, kind: JointKind, unit: AngleUnit) -> Actuator {
     let Some(drive) = drive else {
         return Actuator::default();
     };
@@ -32,6 +33,10 @@ pub(super) fn actuator(drive: Option<&Drive>) -> Actuator {
         torque_constant: drive.torque_constant.map(f64::from),
         rotor_inertia: drive.rotor_inertia.map(f64::from),
         encoder_counts: drive.encoder_counts.map(f64::from),
+        zero: drive.zero.map(|v| match kind {
+            JointKind::Revolute => radians(unit, v.0),
+            JointKind::Prismatic => v.0,
+        }),
         viscous_friction: drive.viscous_friction.map(f64::from),
         coulomb_friction: drive.coulomb_friction.map(f64::from),
     }
@@ -83,13 +88,18 @@ pub(super) fn limits_to_file(limits: &JointLimits) -> Option<Limits> {
     })
 }
 
-pub(super) fn actuator_to_file(actuator: &Actuator) -> Option<Drive> {
-    let stated = *actuator != Actuator::default();
+pub(super) fn actuator_to_file(
+    actuator: &Actuator,
+    coupled: BTreeMap<String, Number>,
+) -> Option<Drive> {
+    let stated = *actuator != Actuator::default() || !coupled.is_empty();
     stated.then(|| Drive {
         gear_ratio: actuator.gear_ratio.map(Number),
         torque_constant: actuator.torque_constant.map(Number),
         rotor_inertia: actuator.rotor_inertia.map(Number),
         encoder_counts: actuator.encoder_counts.map(Number),
+        zero: actuator.zero.map(Number),
+        coupled,
         viscous_friction: actuator.viscous_friction.map(Number),
         coulomb_friction: actuator.coulomb_friction.map(Number),
     })

@@ -1,5 +1,6 @@
 //! A robot as RON text.
 
+use super::drives::{coupled_to_file, known_to_file, log_to_file};
 use super::format::{AngleUnit, Entry, File, Joints, Kind, Number, PoseFrame};
 use super::values::{actuator_to_file, inertial_to_file, limits_to_file};
 use crate::pose::Pose;
@@ -17,7 +18,8 @@ pub fn robot_to_ron(robot: &Robot) -> String {
         .joints()
         .iter()
         .zip(robot.links())
-        .map(|(joint, link)| entry(robot, joint, link))
+        .enumerate()
+        .map(|(i, (joint, link))| entry(robot, i, joint, link))
         .collect();
     let file = File {
         name: robot.name().to_owned(),
@@ -29,6 +31,8 @@ pub fn robot_to_ron(robot: &Robot) -> String {
             .try_into()
             .map_or([Number(0.0); 3], |g: [f64; 3]| g.map(Number)),
         base: None,
+        log: log_to_file(robot.drives()),
+        known_torques: known_to_file(robot),
         joints: Joints::Poses(entries),
     };
     let layout = PrettyConfig::new().struct_names(false).depth_limit(3);
@@ -37,7 +41,7 @@ pub fn robot_to_ron(robot: &Robot) -> String {
     text.expect("plain structs of numbers and strings have a RON form")
 }
 
-fn entry(robot: &Robot, joint: &Joint, link: &Link) -> Entry<PoseFrame> {
+fn entry(robot: &Robot, index: usize, joint: &Joint, link: &Link) -> Entry<PoseFrame> {
     // The base has the reserved name; a link of that name is found first.
     let parent = joint.parent.map_or_else(
         || super::BASE.to_owned(),
@@ -62,7 +66,7 @@ fn entry(robot: &Robot, joint: &Joint, link: &Link) -> Entry<PoseFrame> {
             link_rpy,
         },
         limits: limits_to_file(&joint.limits),
-        actuator: actuator_to_file(&joint.actuator),
+        actuator: actuator_to_file(&joint.actuator, coupled_to_file(robot, index)),
         inertial: link.inertial.as_ref().map(inertial_to_file),
     }
 }
