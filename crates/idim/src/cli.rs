@@ -3,7 +3,8 @@
 use crate::error::Error;
 use crate::identify::{IdentifyOptions, identify};
 use crate::load::{Changes, LoadedRobot, load_robot};
-use crate::logs::read_logs;
+use crate::log_spec::LogSpec;
+use crate::logs::{read_logs, read_mapping};
 use crate::output::write_atomically;
 use crate::progress::Progress;
 use crate::report::{identification_text, paper_text, reduction_text, warnings_text};
@@ -67,12 +68,15 @@ pub struct IdentifyArgs {
     /// Robot file, .ron or .urdf.
     #[arg(long, value_name = "FILE", requires = "log")]
     pub robot: Option<PathBuf>,
-    /// Log to learn from; may be repeated or list several files.
-    #[arg(long, value_name = "FILE", num_args = 1.., requires = "robot")]
-    pub log: Vec<PathBuf>,
-    /// Log to validate on (default: the last 30 % of each log).
-    #[arg(long, value_name = "FILE", num_args = 1.., requires = "log")]
-    pub validate: Vec<PathBuf>,
+    /// Log to learn from, FILE, FILE+FILE (columns side by side), either with @A..B (samples); may be repeated.
+    #[arg(long, value_name = "LOG", num_args = 1.., requires = "robot", value_parser = LogSpec::parse)]
+    pub log: Vec<LogSpec>,
+    /// Log to validate on, named as --log (default: the last 30 % of each log).
+    #[arg(long, value_name = "LOG", num_args = 1.., requires = "log", value_parser = LogSpec::parse)]
+    pub validate: Vec<LogSpec>,
+    /// Which column holds what, where the header does not say so (RON).
+    #[arg(long, value_name = "FILE", requires = "log")]
+    pub mapping: Option<PathBuf>,
     /// Folder for results: DIR/ROBOT/result.json and plots.
     #[arg(long, value_name = "DIR", default_value = "idim-out")]
     pub out: PathBuf,
@@ -151,15 +155,17 @@ fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<()
     let progress = Progress::new();
     progress.stage("reading");
     let loaded = load(robot, &args.changes)?;
-    if let Some(twice) = args.log.iter().find(|l| args.validate.contains(l)) {
+    let seen = |l: &&LogSpec| args.validate.iter().any(|v| v.overlaps(l));
+    if let Some(twice) = args.log.iter().find(seen) {
         return Err(Error::input(
-            twice.display().to_string(),
+            twice.name(),
             "given both as --log and as --validate",
-            "a model is proved on motions it has not seen; give another file",
+            "a model is proved on motions it has not seen; give another file, or another range of samples",
         ));
     }
-    let training = read_logs(&args.log, &loaded)?;
-    let validation = read_logs(&args.validate, &loaded)?;
+    let mapping = read_mapping(args.mapping.as_ref())?;
+    let training = read_logs(&args.log, &loaded, &mapping)?;
+    let validation = read_logs(&args.validate, &loaded, &mapping)?;
     let options = IdentifyOptions {
         columns: drive_columns(args.columns.as_deref()),
         as_recorded: args.as_recorded,

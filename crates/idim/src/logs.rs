@@ -1,9 +1,14 @@
 //! Logs from files, checked before anything is computed.
 
 use crate::error::Error;
-use crate::load::LoadedRobot;
-use idim_measurement::{ColumnMapping, Measurements, check_log, joint_labels, read_csv};
-use std::path::PathBuf;
+use crate::load::{LoadedRobot, read_text};
+use crate::log_spec::LogSpec;
+use crate::transmission::joint_side;
+use idim_measurement::formats::read_log;
+use idim_measurement::{
+    ColumnMapping, JointLabel, Log, Measurements, check_log, joint_labels, read_csv_files,
+};
+use std::path::{Path, PathBuf};
 
 /// Logs read and what was noted about them.
 #[derive(Debug, Clone, Default)]
@@ -15,34 +20,112 @@ pub(crate) struct Logs {
 /// Fewer samples of every joint than this cannot tell a dozen parameters a joint from noise.
 const FEWEST_SAMPLES: usize = 50;
 
-/// Reads and checks logs of one robot.
-pub(crate) fn read_logs(files: &[PathBuf], loaded: &LoadedRobot) -> Result<Logs, Error> {
+/// Reads and checks logs of one robot; positions and torques of motors are brought to the joints.
+pub(crate) fn read_logs(
+    specs: &[LogSpec],
+    loaded: &LoadedRobot,
+    mapping: &ColumnMapping,
+) -> Result<Logs, Error> {
     let labels = joint_labels(&loaded.robot, &loaded.described);
     let mut logs = Logs::default();
-    for path in files {
-        let bytes = std::fs::read(path).map_err(|source| Error::Read {
-            path: path.clone(),
-            source,
-        })?;
-        let log = read_csv(
-            &bytes[..],
-            &path.display().to_string(),
-            &labels,
-            &ColumnMapping::default(),
-        )?;
+    for spec in specs {
+        let log = read(spec, &labels, mapping)?;
+        let log = joint_side(log, &loaded.robot)?;
+        let name = spec.name();
         if log.n_samples() < FEWEST_SAMPLES {
             return Err(Error::input(
-                path.display().to_string(),
+                name,
                 format!("{} samples", log.n_samples()),
                 format!("identification needs at least {FEWEST_SAMPLES}; record a longer motion"),
             ));
         }
         let warnings = check_log(&log, &loaded.robot)?;
         let said = log.notes.iter().chain(&warnings);
-        logs.notes
-            .extend(said.map(|n| format!("{}: {n}", path.display())));
-        logs.measurements
-            .push(Measurements::from_log(&log, &loaded.robot)?);
+        logs.notes.extend(said.map(|n| format!("{name}: {n}")));
+        let measured = Measurements::from_log(&log, &loaded.robot)?;
+        logs.measurements.push(match &spec.samples {
+            None => measured,
+            Some(range) => measured.slice(within(range, &measured, &name)?),
+        });
     }
     Ok(logs)
+}
+
+fn read(spec: &LogSpec, labels: &[JointLabel], mapping: &ColumnMapping) -> Result<Log, Error> {
+    if let [file] = spec.files.as_slice()
+        && !is_text(file)
+    {
+        return Ok(read_log(file, labels, mapping)?);
+    }
+    let contents: Result<Vec<Vec<u8>>, Error> = spec
+        .files
+        .iter()
+        .map(|path| {
+            std::fs::read(path).map_err(|source| Error::Read {
+                path: path.clone(),
+                source,
+            })
+        })
+        .collect();
+    let contents = contents?;
+    // Alone a file is known by its path; beside others by its name, as a mapping writes it.
+    let names: Vec<String> = match spec.files.as_slice() {
+        [one] => vec![one.display().to_string()],
+        many => many.iter().map(|f| file_name(f)).collect(),
+    };
+    let files: Vec<(&[u8], &str)> = contents
+        .iter()
+        .zip(&names)
+        .map(|(bytes, name)| (bytes.as_slice(), name.as_str()))
+        .collect();
+    Ok(read_csv_files(&files, labels, mapping)?)
+}
+
+/// Whether a file is read as comma-separated text: unless its ending says another format.
+fn is_text(file: &Path) -> bool {
+    let other = ["parquet", "npz", "db3", "mcap"];
+    let ending = file.extension().map(|e| e.to_string_lossy().to_lowercase());
+    !file.is_dir() && ending.is_none_or(|e| !other.contains(&e.as_str()))
+}
+
+fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+fn within(
+    range: &std::ops::Range<usize>,
+    measured: &Measurements,
+    name: &str,
+) -> Result<std::ops::Range<usize>, Error> {
+    let n = measured.n_samples();
+    let wanted = range.start..if range.end == usize::MAX {
+        n
+    } else {
+        range.end
+    };
+    if wanted.end > n || wanted.len() < FEWEST_SAMPLES {
+        return Err(Error::input(
+            name,
+            format!("samples {} to {} of {n}", wanted.start, wanted.end),
+            format!("a range lies within the log and holds at least {FEWEST_SAMPLES} samples"),
+        ));
+    }
+    Ok(wanted)
+}
+
+/// The mapping of a file's columns, in RON: which header holds what, the sample rate where there is no clock.
+pub(crate) fn read_mapping(path: Option<&PathBuf>) -> Result<ColumnMapping, Error> {
+    let Some(path) = path else {
+        return Ok(ColumnMapping::default());
+    };
+    let options =
+        ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+    options.from_str(&read_text(path)?).map_err(|e| {
+        Error::input(
+            path.display().to_string(),
+            e.to_string(),
+            "a mapping is (sample_rate: Hz, columns: [(header: \"..\", quantity: .., joint: \"..\", unit: \"..\"), ..])",
+        )
+    })
 }
