@@ -4,7 +4,7 @@
 
 use crate::frame::outer;
 use crate::kinematics::{LinkMotion, Screw, Travel};
-use crate::lane::{Lane, V3, add, cross, dot, splat, times, zero};
+use crate::lane::{Lane, V3, add, cross, dot, like, times, zero};
 use crate::model::KernelJoint;
 use crate::newton_euler::tensor_times;
 
@@ -18,19 +18,37 @@ pub(crate) struct JointBar<T> {
 
 impl<T: Lane> JointBar<T> {
     #[inline(always)]
-    pub(crate) fn zero() -> Self {
-        let q = T::splat(0.0);
+    pub(crate) fn zero(at: T::At) -> Self {
+        let q = T::splat(at, 0.0);
         Self { q, qd: q, qdd: q }
+    }
+
+    /// From memory.
+    #[inline(always)]
+    pub(crate) fn read(at: T::At, cells: &JointBar<T::Cell>) -> Self {
+        Self {
+            q: T::read(at, &cells.q),
+            qd: T::read(at, &cells.qd),
+            qdd: T::read(at, &cells.qdd),
+        }
+    }
+
+    /// To memory.
+    #[inline(always)]
+    pub(crate) fn write(&self, at: T::At, cells: &mut JointBar<T::Cell>) {
+        self.q.write(at, &mut cells.q);
+        self.qd.write(at, &mut cells.qd);
+        self.qdd.write(at, &mut cells.qdd);
     }
 }
 
 impl<T: Lane> LinkMotion<T> {
     #[inline(always)]
-    pub(crate) fn zero() -> Self {
+    pub(crate) fn zero(at: T::At) -> Self {
         Self {
-            w: zero(),
-            wd: zero(),
-            a: zero(),
+            w: zero(at),
+            wd: zero(at),
+            a: zero(at),
         }
     }
 
@@ -96,8 +114,8 @@ pub(crate) fn beyond_bar<T: Lane>(
             out.qdd = out.qdd + bar.a[2];
             let across = bar.a[0].mul_add(m.w[1], -(bar.a[1] * m.w[0]));
             out.qd = out.qd + (across + across);
-            let z = T::splat(0.0);
-            let rate = crate::kinematics::turning(m, [z, z, T::splat(1.0)]);
+            let z = d.like(0.0);
+            let rate = crate::kinematics::turning(m, [z, z, d.like(1.0)]);
             out.q = out.q + dot(bar.a, rate);
             turning_bar(&mut bar, m.w, [z, z, d]);
             let twice = qd + qd;
@@ -111,7 +129,7 @@ pub(crate) fn beyond_bar<T: Lane>(
         a: travel.out_of_joint(joint, bar.a),
     };
     if joint.step.has_translation() {
-        turning_bar(&mut bar, below_w, joint.step.translation());
+        turning_bar(&mut bar, below_w, joint.step.translation(below_w[0]));
     }
     bar
 }
@@ -129,7 +147,7 @@ pub(crate) fn frame_bar<T: Lane>(
         wd: outer(rotation, bar.wd),
         a: outer(rotation, bar.a),
     };
-    turning_bar(&mut bar, m.w, splat(translation));
+    turning_bar(&mut bar, m.w, like(m.w[0], translation));
     bar
 }
 

@@ -2,7 +2,7 @@
 
 use crate::frame::{LinkPose, inner, shift};
 use crate::kinematics::{Screw, Travel};
-use crate::lane::{Lane, cross, dot};
+use crate::lane::{Lane, cross, dot, like};
 use crate::model::Model;
 use crate::parameter::{Columns, ParameterKind};
 use crate::regressor::torque_regressor;
@@ -105,14 +105,19 @@ struct LinkEnergy<T> {
 }
 
 /// The ten energies of every link: kinetic `½ ωᵀ I ω + v·(ω × h) + ½ m v²`, potential `-g·(m p + R h)`.
-pub(crate) fn link_energies<T: Lane>(model: &Model, q: &[T], qd: &[T], links: &mut [[T; 10]]) {
-    let zero = T::splat(0.0);
+pub(crate) fn link_energies<T: Lane<At = ()>>(
+    model: &Model,
+    q: &[T],
+    qd: &[T],
+    links: &mut [[T; 10]],
+) {
+    let zero = T::splat((), 0.0);
     let base = LinkEnergy {
         velocity: Screw {
             angular: [zero; 3],
             linear: [zero; 3],
         },
-        gravity: model.gravity.map(T::splat),
+        gravity: model.gravity.map(|g| T::splat((), g)),
         potential: zero,
     };
     let mut all: Vec<LinkEnergy<T>> = Vec::with_capacity(model.n_joints());
@@ -120,7 +125,7 @@ pub(crate) fn link_energies<T: Lane>(model: &Model, q: &[T], qd: &[T], links: &m
         let travel = Travel::new(joint, q[j]);
         let below = joint.parent.map_or(base, |p| all[p]);
         let gravity = travel.inward(joint.step.rotation.inward(below.gravity));
-        let mut potential = below.potential - dot(below.gravity, joint.step.translation());
+        let mut potential = below.potential - dot(below.gravity, joint.step.translation(q[j]));
         if let Travel::Slide { d } = travel {
             potential = potential - gravity[2] * d;
         }
@@ -143,7 +148,7 @@ pub(crate) fn link_energies<T: Lane>(model: &Model, q: &[T], qd: &[T], links: &m
         };
         for (k, x) in links[j].iter_mut().enumerate() {
             let (from, sign) = joint.link.entry(k);
-            *x = ten[from] * T::splat(sign);
+            *x = ten[from] * q[j].like(sign);
         }
     }
 }
@@ -158,13 +163,13 @@ impl<T: Lane> LinkEnergy<T> {
                 linear: inner(rotation, linear),
             },
             gravity: inner(rotation, self.gravity),
-            potential: self.potential - dot(self.gravity, translation.map(T::splat)),
+            potential: self.potential - dot(self.gravity, like(self.potential, translation)),
         }
     }
 
     /// Energy per unit of the ten parameters in this frame.
     fn ten(&self) -> [T; 10] {
-        let half = T::splat(0.5);
+        let half = self.potential.like(0.5);
         let [x, y, z] = self.velocity.angular;
         let v = self.velocity.linear;
         let first = cross(v, self.velocity.angular);

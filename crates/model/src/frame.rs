@@ -1,6 +1,6 @@
 //! Constant rotations and poses with their structure found out.
 
-use crate::lane::{Lane, V3, dot, splat};
+use crate::lane::{Lane, V3, dot, like};
 use crate::parameter::InertialParameters;
 use crate::pose::Pose;
 use nalgebra::Matrix3;
@@ -55,7 +55,7 @@ impl Rotation {
             Self::None => v,
             Self::Quarter => [v[0], v[2], -v[1]],
             Self::AboutX { c, s } => {
-                let (c, s) = (T::splat(c), T::splat(s));
+                let (c, s) = (v[0].like(c), v[0].like(s));
                 [
                     v[0],
                     c.mul_add(v[1], s * v[2]),
@@ -73,7 +73,7 @@ impl Rotation {
             Self::None => v,
             Self::Quarter => [v[0], -v[2], v[1]],
             Self::AboutX { c, s } => {
-                let (c, s) = (T::splat(c), T::splat(s));
+                let (c, s) = (v[0].like(c), v[0].like(s));
                 [
                     v[0],
                     c.mul_add(v[1], -(s * v[2])),
@@ -112,10 +112,10 @@ impl Fixed {
         self.translation != [0.0; 3]
     }
 
-    /// The translation in every lane.
+    /// The translation in every sample.
     #[inline(always)]
-    pub(crate) fn translation<T: Lane>(&self) -> V3<T> {
-        splat(self.translation)
+    pub(crate) fn translation<T: Lane>(&self, lane: T) -> V3<T> {
+        like(lane, self.translation)
     }
 }
 
@@ -126,18 +126,18 @@ fn rows(r: &Matrix3<f64>) -> [[f64; 3]; 3] {
 #[inline(always)]
 fn columns_times<T: Lane>(r: &[[f64; 3]; 3], v: V3<T>) -> V3<T> {
     [
-        dot(splat([r[0][0], r[1][0], r[2][0]]), v),
-        dot(splat([r[0][1], r[1][1], r[2][1]]), v),
-        dot(splat([r[0][2], r[1][2], r[2][2]]), v),
+        dot(like(v[0], [r[0][0], r[1][0], r[2][0]]), v),
+        dot(like(v[0], [r[0][1], r[1][1], r[2][1]]), v),
+        dot(like(v[0], [r[0][2], r[1][2], r[2][2]]), v),
     ]
 }
 
 #[inline(always)]
 fn rows_times<T: Lane>(r: &[[f64; 3]; 3], v: V3<T>) -> V3<T> {
     [
-        dot(splat(r[0]), v),
-        dot(splat(r[1]), v),
-        dot(splat(r[2]), v),
+        dot(like(v[0], r[0]), v),
+        dot(like(v[0], r[1]), v),
+        dot(like(v[0], r[2]), v),
     ]
 }
 
@@ -147,17 +147,17 @@ pub(crate) fn shift<T: Lane>(p: [f64; 3], v: V3<T>, w: V3<T>) -> V3<T> {
     let mut out = v;
     let [px, py, pz] = p;
     if px != 0.0 {
-        let p = T::splat(px);
+        let p = w[0].like(px);
         out[1] = w[2].mul_add(p, out[1]);
         out[2] = (-w[1]).mul_add(p, out[2]);
     }
     if py != 0.0 {
-        let p = T::splat(py);
+        let p = w[0].like(py);
         out[0] = (-w[2]).mul_add(p, out[0]);
         out[2] = w[0].mul_add(p, out[2]);
     }
     if pz != 0.0 {
-        let p = T::splat(pz);
+        let p = w[0].like(pz);
         out[0] = w[1].mul_add(p, out[0]);
         out[1] = (-w[0]).mul_add(p, out[1]);
     }

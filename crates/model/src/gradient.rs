@@ -6,14 +6,15 @@
 
 use crate::adjoint::{JointBar, beyond_bar, frame_bar, wrench_bar};
 use crate::frame::LinkPose;
-use crate::kinematics::{LinkMotion, Screw, Travel};
-use crate::lane::{F64x8, Lane, dispatch, zero};
+use crate::kinematics::{LinkMotion, Screw, Travel, zero_motion, zero_screw};
+use crate::lane::{Kernel, Lane, read, zero};
 use crate::model::Model;
 use crate::newton_euler::{link_wrench, splat_ten};
 use crate::parameter::{Columns, ParameterKind};
 use crate::projection::{Kinematics, Plan};
 use crate::regressor::{Fill, RegressorBlock};
 use crate::states::{JointStates, LaneStates, eight};
+use crate::wide::{F64x8, over_eight};
 use crate::wrench_map::WrenchMap;
 
 /// Gradient of `Σ_t u_t · Y(q_t, q̇_t, q̈_t) v` with respect to every `q`, `q̇`, `q̈`, in the shape of the states.
@@ -34,12 +35,12 @@ pub fn torque_contraction_gradient(
     let (n, n_samples) = (model.n_joints(), states.n_samples());
     assert_eq!(u.len(), n * n_samples, "u is not joints × samples");
     let terms = [Term::new(model, columns, v)];
-    let mut weights = vec![F64x8::splat(0.0); n];
+    let mut weights = vec![F64x8::ZERO; n];
     over_lanes(model, states, |first, lanes, work| {
         for j in 0..n {
             weights[j] = eight(&u[j * n_samples..][..n_samples], first);
         }
-        dispatch(TorqueContraction {
+        over_eight(&mut TorqueContraction {
             model,
             terms: &terms,
             state: lanes.state(),
@@ -75,7 +76,7 @@ pub fn squared_torque_gradient(
         .map(|(_, v)| Term::new(model, columns, v))
         .collect();
     over_lanes(model, states, |_, lanes, work| {
-        dispatch(TorqueContraction {
+        over_eight(&mut TorqueContraction {
             model,
             terms: &terms,
             state: lanes.state(),
@@ -103,7 +104,7 @@ pub fn regressor_contraction_gradient(
     let plan = Plan::new(model, columns);
     let mut y = RegressorBlock::new(n, columns.len());
     let mut g = y.clone();
-    let mut kinematics = Kinematics::new(model);
+    let mut kinematics = Kinematics::new(model, [F64x8::ZERO, F64x8::ONE]);
     over_lanes(model, states, |first, lanes, work| {
         y.move_to(first, states.n_samples());
         g.move_to(first, states.n_samples());
@@ -114,7 +115,7 @@ pub fn regressor_contraction_gradient(
             kinematics: &mut kinematics,
             rows: y.entries_mut(),
         };
-        fill.run();
+        fill.over_eight();
         weigh(&y, &mut g);
         let contraction = RegressorContraction {
             model,
@@ -124,7 +125,7 @@ pub fn regressor_contraction_gradient(
             weights: g.entries(),
             work,
         };
-        contraction.run();
+        contraction.over_eight();
     })
 }
 
@@ -142,7 +143,7 @@ fn over_lanes(
         "the states have another number of joints than the model"
     );
     let mut gradient = JointStates::zeros(n, n_samples);
-    let mut work = Workspace::new(model);
+    let mut work = Workspace::new(model, F64x8::ZERO);
     let mut lanes = LaneStates::new(n);
     for first in (0..n_samples).step_by(8) {
         lanes.load(states, first);
@@ -150,9 +151,9 @@ fn over_lanes(
         let here = first..n_samples.min(first + 8);
         let count = here.len();
         for (j, bar) in work.out.iter().enumerate() {
-            gradient.q_mut(j)[here.clone()].copy_from_slice(&bar.q.as_array()[..count]);
-            gradient.qd_mut(j)[here.clone()].copy_from_slice(&bar.qd.as_array()[..count]);
-            gradient.qdd_mut(j)[here.clone()].copy_from_slice(&bar.qdd.as_array()[..count]);
+            gradient.q_mut(j)[here.clone()].copy_from_slice(&bar.q.0[..count]);
+            gradient.qd_mut(j)[here.clone()].copy_from_slice(&bar.qd.0[..count]);
+            gradient.qdd_mut(j)[here.clone()].copy_from_slice(&bar.qdd.0[..count]);
         }
     }
     gradient
@@ -191,9 +192,7 @@ impl Term {
 
     #[inline(always)]
     fn drive_torque<T: Lane>(&self, joint: usize, qd: T, qdd: T) -> T {
-        let [rotor, viscous, coulomb, offset] = self.drive[joint];
-        let (rotor, viscous) = (T::splat(rotor), T::splat(viscous));
-        let (coulomb, offset) = (T::splat(coulomb), T::splat(offset));
+        let [rotor, viscous, coulomb, offset] = self.drive[joint].map(|x| qd.like(x));
         let friction = viscous.mul_add(qd, coulomb.mul_add(qd.sign(), offset));
         rotor.mul_add(qdd, friction)
     }
@@ -208,200 +207,235 @@ fn drive_position(kind: ParameterKind) -> usize {
     }
 }
 
-struct Workspace<T> {
-    travel: Vec<Travel<T>>,
+struct Workspace<C> {
+    travel: Vec<[C; 2]>,
     /// Motion at each joint, the joint held still; and of each link.
-    carried: Vec<LinkMotion<T>>,
-    motion: Vec<LinkMotion<T>>,
+    carried: Vec<LinkMotion<C>>,
+    motion: Vec<LinkMotion<C>>,
     /// Derivative with respect to `motion`.
-    bar: Vec<LinkMotion<T>>,
-    wrench: Vec<Screw<T>>,
-    twist: Vec<Screw<T>>,
-    out: Vec<JointBar<T>>,
+    bar: Vec<LinkMotion<C>>,
+    wrench: Vec<Screw<C>>,
+    twist: Vec<Screw<C>>,
+    out: Vec<JointBar<C>>,
 }
 
-impl<T: Lane> Workspace<T> {
-    fn new(model: &Model) -> Self {
+impl<C: Copy> Workspace<C> {
+    fn new(model: &Model, zero: C) -> Self {
         let n = model.n_joints();
+        let out = JointBar {
+            q: zero,
+            qd: zero,
+            qdd: zero,
+        };
         Self {
-            travel: vec![Travel::Slide { d: T::splat(0.0) }; n],
-            carried: vec![LinkMotion::zero(); n],
-            motion: vec![LinkMotion::zero(); n],
-            bar: vec![LinkMotion::zero(); n],
-            wrench: vec![Screw::zero(); n],
-            twist: vec![Screw::zero(); n],
-            out: vec![JointBar::zero(); n],
+            travel: vec![[zero; 2]; n],
+            carried: vec![zero_motion(zero); n],
+            motion: vec![zero_motion(zero); n],
+            bar: vec![zero_motion(zero); n],
+            wrench: vec![zero_screw(zero); n],
+            twist: vec![zero_screw(zero); n],
+            out: vec![out; n],
         }
     }
+}
 
+impl<C> Workspace<C> {
     /// Motions of all links; derivatives start from zero.
     #[inline(always)]
-    fn outward(&mut self, model: &Model, [q, qd, qdd]: [&[T]; 3]) {
-        let base = LinkMotion::base(model);
+    fn outward<T: Lane<Cell = C>>(&mut self, at: T::At, model: &Model, [q, qd, qdd]: [&[C]; 3]) {
+        let base = LinkMotion::<T>::base(at, model);
         for (j, joint) in model.joints.iter().enumerate() {
-            let travel = Travel::new(joint, q[j]);
+            let travel = Travel::new(joint, T::read(at, &q[j]));
             let below = match joint.parent {
-                Some(p) => self.motion[p],
+                Some(p) => LinkMotion::read(at, &self.motion[p]),
                 None => base,
             };
-            self.travel[j] = travel;
-            self.carried[j] = below.carried(joint, travel);
-            self.motion[j] = self.carried[j].moved(travel, qd[j], qdd[j]);
-            self.bar[j] = LinkMotion::zero();
-            self.out[j] = JointBar::zero();
+            let carried = below.carried(joint, travel);
+            let (qd, qdd) = (T::read(at, &qd[j]), T::read(at, &qdd[j]));
+            travel.write(at, &mut self.travel[j]);
+            carried.write(at, &mut self.carried[j]);
+            carried
+                .moved(travel, qd, qdd)
+                .write(at, &mut self.motion[j]);
+            LinkMotion::<T>::zero(at).write(at, &mut self.bar[j]);
+            JointBar::<T>::zero(at).write(at, &mut self.out[j]);
         }
     }
 
     /// Hands the derivatives of the motions back to the joints.
     #[inline(always)]
-    fn inward(&mut self, model: &Model, qd: &[T]) {
+    fn inward<T: Lane<Cell = C>>(&mut self, at: T::At, model: &Model, qd: &[C]) {
         for (j, joint) in model.joints.iter().enumerate().rev() {
             let below_w = match joint.parent {
-                Some(p) => self.motion[p].w,
-                None => zero(),
+                Some(p) => read(at, &self.motion[p].w),
+                None => zero(at),
             };
-            let at_joint = (qd[j], &self.carried[j], below_w);
-            let bar = beyond_bar(
-                joint,
-                self.travel[j],
-                at_joint,
-                self.bar[j],
-                &mut self.out[j],
-            );
+            let carried = LinkMotion::read(at, &self.carried[j]);
+            let at_joint = (T::read(at, &qd[j]), &carried, below_w);
+            let travel = Travel::read(at, joint.kind, &self.travel[j]);
+            let bar = LinkMotion::read(at, &self.bar[j]);
+            let mut out = JointBar::read(at, &self.out[j]);
+            let bar = beyond_bar(joint, travel, at_joint, bar, &mut out);
+            out.write(at, &mut self.out[j]);
             if let Some(p) = joint.parent {
-                self.bar[p] = self.bar[p].plus(&bar);
+                self.add_bar(at, p, &bar);
             }
         }
+    }
+
+    #[inline(always)]
+    fn add_bar<T: Lane<Cell = C>>(&mut self, at: T::At, link: usize, bar: &LinkMotion<T>) {
+        let sum = LinkMotion::read(at, &self.bar[link]).plus(bar);
+        sum.write(at, &mut self.bar[link]);
     }
 }
 
 /// The weights u of a torque: given, or a factor times the torque itself.
-enum Weight<'a, T> {
+enum Weight<'a, C> {
     /// One a joint.
-    Given(&'a [T]),
+    Given(&'a [C]),
     /// At `term * n + joint`.
     TimesTorque(&'a [f64]),
 }
 
-struct TorqueContraction<'a, T> {
+struct TorqueContraction<'a, C> {
     model: &'a Model,
     terms: &'a [Term],
-    state: [&'a [T]; 3],
-    work: &'a mut Workspace<T>,
-    weight: Weight<'a, T>,
+    state: [&'a [C]; 3],
+    work: &'a mut Workspace<C>,
+    weight: Weight<'a, C>,
 }
 
-impl<T: Lane> pulp::WithSimd for TorqueContraction<'_, T> {
-    type Output = ();
-
+impl<C> Kernel<C> for TorqueContraction<'_, C> {
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let (work, joints) = (self.work, &self.model.joints);
-        let n = joints.len();
-        let [_, qd, qdd] = self.state;
-        work.outward(self.model, self.state);
+    fn run<T: Lane<Cell = C>>(&mut self, at: T::At) {
+        self.work.outward::<T>(at, self.model, self.state);
         for (t, term) in self.terms.iter().enumerate() {
-            // Wrench of everything a joint carries, by the parameters v.
-            for j in 0..n {
-                work.wrench[j] = link_wrench(&work.motion[j], &splat_ten(&term.inertial[10 * j..]));
-            }
-            for (j, joint) in joints.iter().enumerate().rev() {
-                if let Some(p) = joint.parent {
-                    let passed = work.wrench[j].wrench_below(joint, work.travel[j]);
-                    work.wrench[p] = work.wrench[p].plus(&passed);
-                }
-            }
-            // Twist of every link if the joints had the speeds u.
-            for (j, joint) in joints.iter().enumerate() {
-                let u = match self.weight {
-                    Weight::Given(u) => u[j],
-                    Weight::TimesTorque(factor) => {
-                        let inertial = work.wrench[j].along_axis(joint.kind);
-                        let torque = inertial + term.drive_torque(j, qd[j], qdd[j]);
-                        torque * T::splat(factor[t * n + j])
-                    }
-                };
-                let below = match joint.parent {
-                    Some(p) => work.twist[p].beyond(joint, work.travel[j]),
-                    None => Screw::zero(),
-                };
-                let twist = below.plus_axis(joint.kind, u);
-                let out = &mut work.out[j];
-                out.q = out.q - twist.cross_wrench(&work.wrench[j]).along_axis(joint.kind);
-                out.qd = T::splat(term.drive[j][1]).mul_add(u, out.qd);
-                out.qdd = T::splat(term.drive[j][0]).mul_add(u, out.qdd);
-                let ten = splat_ten(&term.inertial[10 * j..]);
-                let own = wrench_bar(&work.motion[j], &twist, &ten);
-                work.bar[j] = work.bar[j].plus(&own);
-                work.twist[j] = twist;
+            self.wrenches::<T>(at, term);
+            self.twists::<T>(at, t, term);
+        }
+        self.work.inward::<T>(at, self.model, self.state[1]);
+    }
+}
+
+impl<C> TorqueContraction<'_, C> {
+    /// Wrench of everything a joint carries, by the parameters v.
+    #[inline(always)]
+    fn wrenches<T: Lane<Cell = C>>(&mut self, at: T::At, term: &Term) {
+        let (work, joints) = (&mut *self.work, &self.model.joints);
+        for j in 0..joints.len() {
+            let motion = LinkMotion::<T>::read(at, &work.motion[j]);
+            let ten = splat_ten(at, &term.inertial[10 * j..]);
+            link_wrench(&motion, &ten).write(at, &mut work.wrench[j]);
+        }
+        for (j, joint) in joints.iter().enumerate().rev() {
+            if let Some(p) = joint.parent {
+                let travel = Travel::read(at, joint.kind, &work.travel[j]);
+                let passed = Screw::<T>::read(at, &work.wrench[j]).wrench_below(joint, travel);
+                let sum = Screw::read(at, &work.wrench[p]).plus(&passed);
+                sum.write(at, &mut work.wrench[p]);
             }
         }
-        work.inward(self.model, qd);
+    }
+
+    /// Twist of every link if the joints had the speeds u, and what the derivatives have of it.
+    #[inline(always)]
+    fn twists<T: Lane<Cell = C>>(&mut self, at: T::At, t: usize, term: &Term) {
+        let (work, joints) = (&mut *self.work, &self.model.joints);
+        let [_, qd, qdd] = self.state;
+        for (j, joint) in joints.iter().enumerate() {
+            let wrench = Screw::<T>::read(at, &work.wrench[j]);
+            let u = match self.weight {
+                Weight::Given(u) => T::read(at, &u[j]),
+                Weight::TimesTorque(factor) => {
+                    let (qd, qdd) = (T::read(at, &qd[j]), T::read(at, &qdd[j]));
+                    let torque = wrench.along_axis(joint.kind) + term.drive_torque(j, qd, qdd);
+                    torque * T::splat(at, factor[t * joints.len() + j])
+                }
+            };
+            let below = match joint.parent {
+                Some(p) => {
+                    let travel = Travel::read(at, joint.kind, &work.travel[j]);
+                    Screw::read(at, &work.twist[p]).beyond(joint, travel)
+                }
+                None => Screw::zero(at),
+            };
+            let twist = below.plus_axis(joint.kind, u);
+            let mut out = JointBar::<T>::read(at, &work.out[j]);
+            out.q = out.q - twist.cross_wrench(&wrench).along_axis(joint.kind);
+            out.qd = u.like(term.drive[j][1]).mul_add(u, out.qd);
+            out.qdd = u.like(term.drive[j][0]).mul_add(u, out.qdd);
+            out.write(at, &mut work.out[j]);
+            let ten = splat_ten(at, &term.inertial[10 * j..]);
+            let motion = LinkMotion::read(at, &work.motion[j]);
+            work.add_bar(at, j, &wrench_bar(&motion, &twist, &ten));
+            twist.write(at, &mut work.twist[j]);
+        }
     }
 }
 
 /// `kinematics` as `fill` left it; `weights` as it lays out the rows.
-struct RegressorContraction<'a, T> {
+struct RegressorContraction<'a, C> {
     model: &'a Model,
     plan: &'a Plan,
-    state: [&'a [T]; 3],
-    kinematics: &'a Kinematics<T>,
-    weights: &'a [T],
-    work: &'a mut Workspace<T>,
+    state: [&'a [C]; 3],
+    kinematics: &'a Kinematics<C>,
+    weights: &'a [C],
+    work: &'a mut Workspace<C>,
 }
 
 impl RegressorContraction<'_, F64x8> {
-    /// Compiled here once, as [`Fill::run`] is.
+    /// Compiled here once, as [`Fill::over_eight`] is.
     #[inline(never)]
-    fn run(self) {
-        dispatch(self);
+    fn over_eight(mut self) {
+        over_eight(&mut self);
     }
 }
 
-impl<T: Lane> pulp::WithSimd for RegressorContraction<'_, T> {
-    type Output = ();
-
+impl<C: Copy> Kernel<C> for RegressorContraction<'_, C> {
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(mut self, _: S) {
-        self.work.outward(self.model, self.state);
+    fn run<T: Lane<Cell = C>>(&mut self, at: T::At) {
+        self.work.outward::<T>(at, self.model, self.state);
         for j in 0..self.model.n_joints() {
-            self.link(j);
+            self.link::<T>(at, j);
             for &(kind, column) in &self.plan.drives[j] {
-                let weight = self.weights[j * self.plan.n_columns + column];
-                let out = &mut self.work.out[j];
+                let weight = T::read(at, &self.weights[j * self.plan.n_columns + column]);
+                let mut out = JointBar::<T>::read(at, &self.work.out[j]);
                 match kind {
                     ParameterKind::Ia => out.qdd = out.qdd + weight,
                     ParameterKind::Fv => out.qd = out.qd + weight,
                     _ => {}
                 }
+                out.write(at, &mut self.work.out[j]);
             }
         }
-        self.work.inward(self.model, self.state[1]);
+        self.work.inward::<T>(at, self.model, self.state[1]);
     }
 }
 
-impl<T: Lane> RegressorContraction<'_, T> {
+impl<C: Copy> RegressorContraction<'_, C> {
     /// Derivatives by way of the wrench of link `j`, in the frame its parameters are given in.
     #[inline(always)]
-    fn link(&mut self, j: usize) {
+    fn link<T: Lane<Cell = C>>(&mut self, at: T::At, j: usize) {
         let (joint, plan) = (&self.model.joints[j], &self.plan.links[j]);
         if plan.is_empty() {
             return;
         }
+        let own_motion = LinkMotion::<T>::read(at, &self.work.motion[j]);
         let motion = match &joint.link {
-            LinkPose::Along(_) => self.work.motion[j],
+            LinkPose::Along(_) => own_motion,
             LinkPose::Posed {
                 rotation,
                 translation,
                 ..
-            } => WrenchMap::new(&self.work.motion[j]).motion_at(rotation, *translation),
+            } => WrenchMap::new(&own_motion).motion_at(rotation, *translation),
         };
-        let mut bar = LinkMotion::zero();
-        let mut below: Screw<T> = Screw::zero();
+        let mut bar = LinkMotion::zero(at);
+        let mut below = Screw::zero(at);
         for d in &joint.directions {
             for &i in &joint.path[d.range.clone()] {
-                let ten = self.weights_of(j, i);
-                let axis = self.kinematics.axis(j, d, i);
+                let ten = self.weights_of(at, j, i);
+                let axis = self.kinematics.axis::<T>(at, j, d, i);
                 let axis = match &joint.link {
                     LinkPose::Along(_) => axis,
                     LinkPose::Posed {
@@ -411,8 +445,9 @@ impl<T: Lane> RegressorContraction<'_, T> {
                     } => axis.at(rotation, *translation),
                 };
                 // A turn of joint i moves the axes below it as this link sees them.
-                let out = &mut self.work.out[i];
-                out.q = out.q - axis.power(&below);
+                let out = &mut self.work.out[i].q;
+                let q = T::read(at, out) - axis.power(&below);
+                q.write(at, out);
                 below = below.plus(&axis.cross_wrench(&link_wrench(&motion, &ten)));
                 bar = bar.plus(&wrench_bar(&motion, &axis, &ten));
             }
@@ -423,22 +458,22 @@ impl<T: Lane> RegressorContraction<'_, T> {
             ..
         } = &joint.link
         {
-            bar = frame_bar(&self.work.motion[j], bar, rotation, *translation);
+            bar = frame_bar(&own_motion, bar, rotation, *translation);
         }
-        self.work.bar[j] = self.work.bar[j].plus(&bar);
+        self.work.add_bar(at, j, &bar);
     }
 
     /// The weights of row `i` in the columns of link `j`, as ten parameters.
     #[inline(always)]
-    fn weights_of(&self, j: usize, i: usize) -> [T; 10] {
+    fn weights_of<T: Lane<Cell = C>>(&self, at: T::At, j: usize, i: usize) -> [T; 10] {
         let row = &self.weights[i * self.plan.n_columns..][..self.plan.n_columns];
-        let mut ten = [T::splat(0.0); 10];
+        let mut ten = [T::splat(at, 0.0); 10];
         let plan = &self.plan.links[j];
         for k in 0..10 {
-            ten[k] = plan.get(k, row);
+            ten[k] = plan.get(at, k, row);
             for twin in &self.plan.twins {
                 if (twin.link, twin.entry) == (j, k) {
-                    let more = row[twin.column];
+                    let more = T::read(at, &row[twin.column]);
                     ten[k] = ten[k] + if twin.negated { -more } else { more };
                 }
             }

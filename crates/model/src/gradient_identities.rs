@@ -28,9 +28,9 @@ fn regressor_derivatives(model: &Model, columns: &Columns, s: &JointState) -> Ve
             };
             let (q, qd, qdd) = (seeded(0, &s.q), seeded(1, &s.qd), seeded(2, &s.qdd));
             let mut rows = vec![dual(0.0, 0.0); n * columns.len()];
-            let mut kinematics = Kinematics::new(model);
+            let mut kinematics = Kinematics::new(model, [dual(0.0, 0.0), dual(1.0, 0.0)]);
             let state = [&q[..], &qd, &qdd];
-            fill(model, &plan, state, &mut kinematics, &mut rows);
+            fill::<Dual>((), model, &plan, state, &mut kinematics, &mut rows);
             rows
         })
         .collect()

@@ -1,9 +1,26 @@
 //! The outward recursion: what every link of an arm feels of the motion of the joints below it.
 
 use crate::frame::{Offset, shift};
-use crate::lane::{Lane, V3, add, cross, minus, splat, zero};
+use crate::lane::{Lane, V3, add, cross, minus, read, splat, write, zero};
 use crate::model::{KernelJoint, Model};
 use crate::robot::JointKind;
+
+/// All zero, in memory.
+pub(crate) fn zero_motion<C: Copy>(zero: C) -> LinkMotion<C> {
+    LinkMotion {
+        w: [zero; 3],
+        wd: [zero; 3],
+        a: [zero; 3],
+    }
+}
+
+/// All zero, in memory.
+pub(crate) fn zero_screw<C: Copy>(zero: C) -> Screw<C> {
+    Screw {
+        angular: [zero; 3],
+        linear: [zero; 3],
+    }
+}
 
 /// Motion of a link at its joint's frame, in the axes of that frame.
 #[derive(Debug, Clone, Copy)]
@@ -38,10 +55,36 @@ impl<T: Lane> Travel<T> {
         match joint.kind {
             JointKind::Revolute => {
                 let Offset { quarters, rest } = joint.offset;
-                let (s, c) = (q + T::splat(rest)).sin_cos(quarters);
+                let (s, c) = (q + q.like(rest)).sin_cos(quarters);
                 Self::Turn { s, c }
             }
             JointKind::Prismatic => Self::Slide { d: q },
+        }
+    }
+
+    /// From memory.
+    #[inline(always)]
+    pub(crate) fn read(at: T::At, kind: JointKind, cells: &[T::Cell; 2]) -> Self {
+        match kind {
+            JointKind::Revolute => Self::Turn {
+                s: T::read(at, &cells[0]),
+                c: T::read(at, &cells[1]),
+            },
+            JointKind::Prismatic => Self::Slide {
+                d: T::read(at, &cells[0]),
+            },
+        }
+    }
+
+    /// To memory.
+    #[inline(always)]
+    pub(crate) fn write(self, at: T::At, cells: &mut [T::Cell; 2]) {
+        match self {
+            Self::Turn { s, c } => {
+                s.write(at, &mut cells[0]);
+                c.write(at, &mut cells[1]);
+            }
+            Self::Slide { d } => d.write(at, &mut cells[0]),
         }
     }
 
@@ -93,12 +136,30 @@ pub(crate) fn turning<T: Lane>(m: &LinkMotion<T>, p: V3<T>) -> V3<T> {
 impl<T: Lane> LinkMotion<T> {
     /// The base: at rest, accelerated against gravity.
     #[inline(always)]
-    pub(crate) fn base(model: &Model) -> Self {
+    pub(crate) fn base(at: T::At, model: &Model) -> Self {
         Self {
-            w: zero(),
-            wd: zero(),
-            a: minus(splat(model.gravity)),
+            w: zero(at),
+            wd: zero(at),
+            a: minus(splat(at, model.gravity)),
         }
+    }
+
+    /// From memory.
+    #[inline(always)]
+    pub(crate) fn read(at: T::At, cells: &LinkMotion<T::Cell>) -> Self {
+        Self {
+            w: read(at, &cells.w),
+            wd: read(at, &cells.wd),
+            a: read(at, &cells.a),
+        }
+    }
+
+    /// To memory.
+    #[inline(always)]
+    pub(crate) fn write(&self, at: T::At, cells: &mut LinkMotion<T::Cell>) {
+        write(at, self.w, &mut cells.w);
+        write(at, self.wd, &mut cells.wd);
+        write(at, self.a, &mut cells.a);
     }
 
     /// Motion of the link a joint carries, from that of the link it stands on.
@@ -112,7 +173,7 @@ impl<T: Lane> LinkMotion<T> {
     pub(crate) fn carried(&self, joint: &KernelJoint, travel: Travel<T>) -> Self {
         let mut m = *self;
         if joint.step.has_translation() {
-            m.a = add(m.a, turning(self, joint.step.translation()));
+            m.a = add(m.a, turning(self, joint.step.translation(self.w[0])));
         }
         m.turned(joint, travel)
     }
@@ -140,7 +201,7 @@ impl<T: Lane> LinkMotion<T> {
                 m.w[2] = m.w[2] + qd;
             }
             Travel::Slide { d } => {
-                let z = T::splat(0.0);
+                let z = d.like(0.0);
                 let moved = turning(&m, [z, z, d]);
                 let coriolis = qd + qd;
                 m.a = add(m.a, moved);
@@ -155,11 +216,27 @@ impl<T: Lane> LinkMotion<T> {
 
 impl<T: Lane> Screw<T> {
     #[inline(always)]
-    pub(crate) fn zero() -> Self {
+    pub(crate) fn zero(at: T::At) -> Self {
         Self {
-            angular: zero(),
-            linear: zero(),
+            angular: zero(at),
+            linear: zero(at),
         }
+    }
+
+    /// From memory.
+    #[inline(always)]
+    pub(crate) fn read(at: T::At, cells: &Screw<T::Cell>) -> Self {
+        Self {
+            angular: read(at, &cells.angular),
+            linear: read(at, &cells.linear),
+        }
+    }
+
+    /// To memory.
+    #[inline(always)]
+    pub(crate) fn write(&self, at: T::At, cells: &mut Screw<T::Cell>) {
+        write(at, self.angular, &mut cells.angular);
+        write(at, self.linear, &mut cells.linear);
     }
 
     /// A motion (velocity-like) of the link below, in the frame of the joint.

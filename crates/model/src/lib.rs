@@ -50,6 +50,7 @@ mod suggestion;
 #[cfg(test)]
 mod testing;
 mod urdf;
+mod wide;
 mod wrench_map;
 
 pub use energy::{energy_difference, energy_regressor, momentum_regressor, power_regressor};

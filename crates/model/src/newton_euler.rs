@@ -1,9 +1,10 @@
 //! Newton-Euler inverse dynamics.
 
-use crate::kinematics::{LinkMotion, Screw, Travel};
-use crate::lane::{F64x8, Lane, V3, add, cross, dispatch, dot, times};
+use crate::kinematics::{LinkMotion, Screw, Travel, zero_motion, zero_screw};
+use crate::lane::{Kernel, Lane, V3, add, cross, dot, times};
 use crate::model::Model;
 use crate::states::{JointState, JointStates, LaneStates};
+use crate::wide::{F64x8, over_eight, over_one};
 
 /// Joint torques of a motion, N·m (N for a prismatic joint).
 ///
@@ -22,11 +23,11 @@ pub fn inverse_dynamics(model: &Model, parameters: &[f64], state: &JointState) -
         "the state has another number of joints than the model"
     );
     let mut torque = vec![0.0; model.n_joints()];
-    dispatch(Recursion {
+    over_one(&mut Recursion {
         model,
         parameters: &model.kernel_parameters(parameters),
         state: [&state.q, &state.qd, &state.qdd],
-        work: &mut Workspace::new(model),
+        work: &mut Workspace::new(model, 0.0),
         torque: &mut torque,
     });
     torque
@@ -47,12 +48,12 @@ pub fn inverse_dynamics_batch(model: &Model, parameters: &[f64], states: &JointS
     );
     let parameters = model.kernel_parameters(parameters);
     let mut torque = vec![0.0; n * n_samples];
-    let mut work = Workspace::new(model);
+    let mut work = Workspace::new(model, F64x8::ZERO);
     let mut lanes = LaneStates::new(n);
-    let mut out = vec![F64x8::splat(0.0); n];
+    let mut out = vec![F64x8::ZERO; n];
     for first in (0..n_samples).step_by(8) {
         lanes.load(states, first);
-        dispatch(Recursion {
+        over_eight(&mut Recursion {
             model,
             parameters: &parameters,
             state: lanes.state(),
@@ -61,7 +62,7 @@ pub fn inverse_dynamics_batch(model: &Model, parameters: &[f64], states: &JointS
         });
         let count = (n_samples - first).min(8);
         for j in 0..n {
-            torque[j * n_samples + first..][..count].copy_from_slice(&out[j].as_array()[..count]);
+            torque[j * n_samples + first..][..count].copy_from_slice(&out[j].0[..count]);
         }
     }
     torque
@@ -76,67 +77,70 @@ fn assert_parameters(model: &Model, parameters: &[f64]) {
     );
 }
 
-struct Workspace<T> {
-    motion: Vec<LinkMotion<T>>,
-    travel: Vec<Travel<T>>,
-    wrench: Vec<Screw<T>>,
+struct Workspace<C> {
+    motion: Vec<LinkMotion<C>>,
+    travel: Vec<[C; 2]>,
+    wrench: Vec<Screw<C>>,
 }
 
-impl<T: Lane> Workspace<T> {
-    fn new(model: &Model) -> Self {
+impl<C: Copy> Workspace<C> {
+    fn new(model: &Model, zero: C) -> Self {
         let n = model.n_joints();
         Self {
-            motion: vec![LinkMotion::zero(); n],
-            travel: vec![Travel::Slide { d: T::splat(0.0) }; n],
-            wrench: vec![Screw::zero(); n],
+            motion: vec![zero_motion(zero); n],
+            travel: vec![[zero; 2]; n],
+            wrench: vec![zero_screw(zero); n],
         }
     }
 }
 
 /// Outward for motions, inward for wrenches; `parameters` in the joint frames.
-struct Recursion<'a, T> {
+struct Recursion<'a, C> {
     model: &'a Model,
     parameters: &'a [f64],
-    state: [&'a [T]; 3],
-    work: &'a mut Workspace<T>,
-    torque: &'a mut [T],
+    state: [&'a [C]; 3],
+    work: &'a mut Workspace<C>,
+    torque: &'a mut [C],
 }
 
-impl<T: Lane> pulp::WithSimd for Recursion<'_, T> {
-    type Output = ();
-
+impl<C> Kernel<C> for Recursion<'_, C> {
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let ([q, qd, qdd], work) = (self.state, self.work);
-        let base = LinkMotion::base(self.model);
+    fn run<T: Lane<Cell = C>>(&mut self, at: T::At) {
+        let ([q, qd, qdd], work) = (self.state, &mut *self.work);
+        let base = LinkMotion::<T>::base(at, self.model);
         for (j, joint) in self.model.joints.iter().enumerate() {
-            let travel = Travel::new(joint, q[j]);
+            let travel = Travel::new(joint, T::read(at, &q[j]));
             let below = match joint.parent {
-                Some(p) => work.motion[p],
+                Some(p) => LinkMotion::read(at, &work.motion[p]),
                 None => base,
             };
-            let motion = below.beyond(joint, travel, qd[j], qdd[j]);
-            work.wrench[j] = link_wrench(&motion, &splat_ten(&self.parameters[10 * j..]));
-            work.motion[j] = motion;
-            work.travel[j] = travel;
+            let (qd, qdd) = (T::read(at, &qd[j]), T::read(at, &qdd[j]));
+            let motion = below.beyond(joint, travel, qd, qdd);
+            let ten = splat_ten(at, &self.parameters[10 * j..]);
+            link_wrench(&motion, &ten).write(at, &mut work.wrench[j]);
+            motion.write(at, &mut work.motion[j]);
+            travel.write(at, &mut work.travel[j]);
         }
         for (j, joint) in self.model.joints.iter().enumerate().rev() {
-            let wrench = work.wrench[j];
-            self.torque[j] = wrench.along_axis(joint.kind);
+            let wrench = Screw::<T>::read(at, &work.wrench[j]);
+            let torque = wrench.along_axis(joint.kind);
+            torque.write(at, &mut self.torque[j]);
             if let Some(p) = joint.parent {
-                let passed = wrench.wrench_below(joint, work.travel[j]);
-                work.wrench[p] = work.wrench[p].plus(&passed);
+                let travel = Travel::read(at, joint.kind, &work.travel[j]);
+                let passed = wrench.wrench_below(joint, travel);
+                let sum = Screw::read(at, &work.wrench[p]).plus(&passed);
+                sum.write(at, &mut work.wrench[p]);
             }
         }
     }
 }
 
-/// The ten parameters of a link in every lane.
+/// The ten parameters of a link in every sample.
 #[inline(always)]
-pub(crate) fn splat_ten<T: Lane>(parameters: &[f64]) -> [T; 10] {
-    let mut ten = [T::splat(0.0); 10];
+pub(crate) fn splat_ten<T: Lane>(at: T::At, parameters: &[f64]) -> [T; 10] {
+    let mut ten = [T::splat(at, 0.0); 10];
     for k in 0..10 {
-        ten[k] = T::splat(parameters[k]);
+        ten[k] = T::splat(at, parameters[k]);
     }
     ten
 }
@@ -166,20 +170,22 @@ pub(crate) fn link_wrench<T: Lane>(m: &LinkMotion<T>, p: &[T; 10]) -> Screw<T> {
 
 /// The recursion for any lane: dual numbers of the tests.
 #[cfg(test)]
-pub(crate) fn torque_of<T: Lane>(
+pub(crate) fn torque_of<T: Lane<At = (), Cell = T>>(
     model: &Model,
     parameters: &[f64],
     q: &[T],
     qd: &[T],
     qdd: &[T],
 ) -> Vec<T> {
-    let mut torque = vec![T::splat(0.0); model.n_joints()];
-    dispatch(Recursion {
+    let zero = T::splat((), 0.0);
+    let mut torque = vec![zero; model.n_joints()];
+    let mut recursion = Recursion {
         model,
         parameters: &model.kernel_parameters(parameters),
         state: [q, qd, qdd],
-        work: &mut Workspace::new(model),
+        work: &mut Workspace::new(model, zero),
         torque: &mut torque,
-    });
+    };
+    recursion.run::<T>(());
     torque
 }

@@ -5,8 +5,8 @@
 //! entries of the inertia tensor; the link's own axis is z, and the one before it most often has no part along z.
 
 use crate::frame::{LinkPose, Rotation, shift};
-use crate::kinematics::{LinkMotion, Screw, Travel};
-use crate::lane::{Lane, V3, minus, splat, times, zero};
+use crate::kinematics::{LinkMotion, Screw, Travel, zero_motion};
+use crate::lane::{Lane, V3, minus, read, splat, times, write, zero};
 use crate::model::{Direction, KernelJoint, Model};
 use crate::parameter::{Columns, ParameterKind};
 use crate::robot::JointKind;
@@ -68,21 +68,26 @@ impl LinkPlan {
 
     /// Writes entry `k`, which is asked for, to its column of a row.
     #[inline(always)]
-    fn put<T: Lane>(&self, k: usize, row: &mut [T], value: T) {
-        row[self.column[k]] = if self.negated >> k & 1 == 1 {
+    fn put<T: Lane>(&self, at: T::At, k: usize, row: &mut [T::Cell], value: T) {
+        let value = if self.negated >> k & 1 == 1 {
             -value
         } else {
             value
         };
+        value.write(at, &mut row[self.column[k]]);
     }
 
     /// Entry `k` from its column of a row, zero where it was not asked for.
     #[inline(always)]
-    pub(crate) fn get<T: Lane>(&self, k: usize, row: &[T]) -> T {
-        match (self.wants::<ASK>(k), self.negated >> k & 1 == 1) {
-            (false, _) => T::splat(0.0),
-            (true, false) => row[self.column[k]],
-            (true, true) => -row[self.column[k]],
+    pub(crate) fn get<T: Lane>(&self, at: T::At, k: usize, row: &[T::Cell]) -> T {
+        if !self.wants::<ASK>(k) {
+            return T::splat(at, 0.0);
+        }
+        let value = T::read(at, &row[self.column[k]]);
+        if self.negated >> k & 1 == 1 {
+            -value
+        } else {
+            value
         }
     }
 }
@@ -128,38 +133,45 @@ impl Plan {
 
 /// Motions and axes of one sample or eight.
 #[derive(Debug, Clone)]
-pub(crate) struct Kinematics<T> {
+pub(crate) struct Kinematics<C> {
     n: usize,
     /// Motion of every link; before its turn has come, of the link below at this joint's origin.
-    motion: Vec<LinkMotion<T>>,
+    motion: Vec<LinkMotion<C>>,
     /// At `link * n + d`: direction `d` of the link's path; the last one is z and stays.
-    direction: Vec<V3<T>>,
+    direction: Vec<V3<C>>,
     /// At `link * n + joint`: speed of the link's origin per unit speed of a revolute joint; zero for the link's own.
-    linear: Vec<V3<T>>,
+    linear: Vec<V3<C>>,
 }
 
-impl<T: Lane> Kinematics<T> {
-    pub(crate) fn new(model: &Model) -> Self {
+impl<C: Copy> Kinematics<C> {
+    /// `zero` and `one` in every sample.
+    pub(crate) fn new(model: &Model, [zero, one]: [C; 2]) -> Self {
         let n = model.n_joints();
         Self {
             n,
-            motion: vec![LinkMotion::zero(); n],
-            direction: vec![z_axis(); n * n],
-            linear: vec![zero(); n * n],
+            motion: vec![zero_motion(zero); n],
+            direction: vec![[zero, zero, one]; n * n],
+            linear: vec![[zero; 3]; n * n],
         }
     }
 
     /// Axis of joint `i`, of direction `d`, at the frame of link `j`.
     #[inline(always)]
-    pub(crate) fn axis(&self, j: usize, d: &Direction, i: usize) -> Screw<T> {
-        let direction = self.direction[j * self.n + d.index];
+    pub(crate) fn axis<T: Lane<Cell = C>>(
+        &self,
+        at: T::At,
+        j: usize,
+        d: &Direction,
+        i: usize,
+    ) -> Screw<T> {
+        let direction = read(at, &self.direction[j * self.n + d.index]);
         match d.kind {
             JointKind::Revolute => Screw {
                 angular: direction,
-                linear: self.linear[j * self.n + i],
+                linear: read(at, &self.linear[j * self.n + i]),
             },
             JointKind::Prismatic => Screw {
-                angular: zero(),
+                angular: zero(at),
                 linear: direction,
             },
         }
@@ -167,7 +179,13 @@ impl<T: Lane> Kinematics<T> {
 
     /// Takes link `j` from the link below: its motion and the axes on its path.
     #[inline(always)]
-    fn go_out(&mut self, model: &Model, j: usize, [q, qd, qdd]: [T; 3]) -> WrenchMap<T> {
+    fn go_out<T: Lane<Cell = C>>(
+        &mut self,
+        at: T::At,
+        model: &Model,
+        j: usize,
+        [q, qd, qdd]: [T; 3],
+    ) -> WrenchMap<T> {
         // The same lines for every step, compiled once for each simple one.
         match (
             model.joints[j].step.rotation,
@@ -175,46 +193,46 @@ impl<T: Lane> Kinematics<T> {
         ) {
             (Rotation::Quarter, Travel::Turn { s, c }) => {
                 let step = (Rotation::Quarter, Travel::Turn { s, c });
-                self.carry_axes(model, j, step);
-                self.move_link(model, j, step, qd, qdd)
+                self.carry_axes(at, model, j, step);
+                self.move_link(at, model, j, step, [qd, qdd])
             }
             (Rotation::None, Travel::Turn { s, c }) => {
                 let step = (Rotation::None, Travel::Turn { s, c });
-                self.carry_axes(model, j, step);
-                self.move_link(model, j, step, qd, qdd)
+                self.carry_axes(at, model, j, step);
+                self.move_link(at, model, j, step, [qd, qdd])
             }
             step => {
-                self.carry_axes(model, j, step);
-                self.move_link(model, j, step, qd, qdd)
+                self.carry_axes(at, model, j, step);
+                self.move_link(at, model, j, step, [qd, qdd])
             }
         }
     }
 
     /// Motion of link `j` about its joint's frame, and what it does at the joints the link carries.
     #[inline(always)]
-    fn move_link(
+    fn move_link<T: Lane<Cell = C>>(
         &mut self,
+        at: T::At,
         model: &Model,
         j: usize,
         step: (Rotation, Travel<T>),
-        qd: T,
-        qdd: T,
+        [qd, qdd]: [T; 2],
     ) -> WrenchMap<T> {
         let joint = &model.joints[j];
-        let below = &self.motion[j];
+        let below = LinkMotion::<T>::read(at, &self.motion[j]);
         let carried = match joint.parent {
             None => {
                 let up = joint.step.rotation.inward(minus(model.gravity));
                 let vertical = up[0] == 0.0 && up[1] == 0.0;
-                let a = splat(up);
+                let a = splat(at, up);
                 LinkMotion {
-                    w: zero(),
-                    wd: zero(),
+                    w: zero(at),
+                    wd: zero(at),
                     a: if vertical { a } else { step.1.inward(a) },
                 }
             }
             Some(p) if model.joints[p].planar => {
-                let z = z_beyond(step);
+                let z = z_beyond(at, step);
                 LinkMotion {
                     w: times(below.w[2], z),
                     wd: times(below.wd[2], z),
@@ -234,17 +252,24 @@ impl<T: Lane> Kinematics<T> {
             WrenchMap::new(&motion)
         };
         for &c in &joint.children {
-            self.motion[c] = LinkMotion {
+            let at_child = LinkMotion {
                 a: map.acceleration_at(model.joints[c].step.translation),
                 ..motion
             };
+            at_child.write(at, &mut self.motion[c]);
         }
         map
     }
 
     /// Carries the axes of the link below out to link `j`.
     #[inline(always)]
-    fn carry_axes(&mut self, model: &Model, j: usize, step: (Rotation, Travel<T>)) {
+    fn carry_axes<T: Lane<Cell = C>>(
+        &mut self,
+        at: T::At,
+        model: &Model,
+        j: usize,
+        step: (Rotation, Travel<T>),
+    ) {
         let joint = &model.joints[j];
         let Some(p) = joint.parent else { return };
         let n = self.n;
@@ -257,30 +282,31 @@ impl<T: Lane> Kinematics<T> {
         for d in below {
             let own_of_below = d.index + 1 == below.len();
             let stays = d.index + 1 == joint.directions.len();
-            let outside = directions[d.index];
+            let outside = read(at, &directions[d.index]);
             let direction = match (stays, own_of_below) {
-                (true, _) => z_axis(),
-                (false, true) => z_beyond(step),
+                (true, _) => z_axis(at),
+                (false, true) => z_beyond(at, step),
                 (false, false) => into_joint(step, outside),
             };
             if !stays {
-                out[d.index] = direction;
+                write(at, direction, &mut out[d.index]);
             }
             if d.kind == JointKind::Prismatic {
                 continue;
             }
             for &i in &joint.path[d.range.clone()] {
+                let inside = read(at, &linears[i]);
                 let shifted = if own_of_below {
-                    shift_about_z(p_from, linears[i])
+                    shift_about_z(p_from, inside)
                 } else {
-                    shift(p_from, linears[i], outside)
+                    shift(p_from, inside, outside)
                 };
                 let mut linear = into_joint(step, shifted);
                 if let Travel::Slide { d } = step.1 {
                     linear[0] = direction[1].mul_add(d, linear[0]);
                     linear[1] = (-direction[0]).mul_add(d, linear[1]);
                 }
-                out_linear[i] = linear;
+                write(at, linear, &mut out_linear[i]);
             }
         }
     }
@@ -293,192 +319,209 @@ fn into_joint<T: Lane>((rotation, travel): (Rotation, Travel<T>), v: V3<T>) -> V
 }
 
 #[inline(always)]
-fn z_axis<T: Lane>() -> V3<T> {
-    [T::splat(0.0), T::splat(0.0), T::splat(1.0)]
+fn z_axis<T: Lane>(at: T::At) -> V3<T> {
+    splat(at, [0.0, 0.0, 1.0])
 }
 
 /// The axis of the joint below in the frame of a joint.
 #[inline(always)]
-fn z_beyond<T: Lane>(step: (Rotation, Travel<T>)) -> V3<T> {
+fn z_beyond<T: Lane>(at: T::At, step: (Rotation, Travel<T>)) -> V3<T> {
     match step {
-        (Rotation::Quarter, Travel::Turn { s, c }) => [s, c, T::splat(0.0)],
-        _ => into_joint(step, z_axis()),
+        (Rotation::Quarter, Travel::Turn { s, c }) => [s, c, s.like(0.0)],
+        _ => into_joint(step, z_axis(at)),
     }
 }
 
 /// `z × p + v`.
 #[inline(always)]
 fn shift_about_z<T: Lane>(p: [f64; 3], v: V3<T>) -> V3<T> {
-    [v[0] - T::splat(p[1]), v[1] + T::splat(p[0]), v[2]]
+    [v[0] - v[0].like(p[1]), v[1] + v[1].like(p[0]), v[2]]
 }
 
 /// Writes the entries that can be other than zero; `rows` is `n × p`, joint by joint, zero where nothing was written yet.
 #[inline(always)]
 pub(crate) fn fill<T: Lane>(
+    at: T::At,
     model: &Model,
     plan: &Plan,
-    [q, qd, qdd]: [&[T]; 3],
-    kinematics: &mut Kinematics<T>,
-    rows: &mut [T],
+    [q, qd, qdd]: [&[T::Cell]; 3],
+    kinematics: &mut Kinematics<T::Cell>,
+    rows: &mut [T::Cell],
 ) {
     let p = plan.n_columns;
     for (j, joint) in model.joints.iter().enumerate() {
-        let map = kinematics.go_out(model, j, [q[j], qd[j], qdd[j]]);
+        let q = T::read(at, &q[j]);
+        let (qd, qdd) = (T::read(at, &qd[j]), T::read(at, &qdd[j]));
+        let map = kinematics.go_out(at, model, j, [q, qd, qdd]);
         let link = &plan.links[j];
         if !link.is_empty() {
-            project(joint, j, &map, kinematics, link, p, rows);
+            let to = Target { at, j, link, p };
+            to.project(joint, &map, kinematics, rows);
         }
         for &(kind, column) in &plan.drives[j] {
-            rows[j * p + column] = match kind {
-                ParameterKind::Ia => qdd[j],
-                ParameterKind::Fv => qd[j],
-                ParameterKind::Fc => qd[j].sign(),
-                _ => T::splat(1.0),
+            let entry = match kind {
+                ParameterKind::Ia => qdd,
+                ParameterKind::Fv => qd,
+                ParameterKind::Fc => qd.sign(),
+                _ => T::splat(at, 1.0),
             };
+            entry.write(at, &mut rows[j * p + column]);
         }
     }
     for twin in &plan.twins {
         for &i in &model.joints[twin.link].path {
-            rows[i * p + twin.column] = rows[i * p + twin.first];
+            let entry = T::read(at, &rows[i * p + twin.first]);
+            entry.write(at, &mut rows[i * p + twin.column]);
         }
     }
 }
 
-/// The rows' entries for the columns of a link.
-#[inline(always)]
-fn project<T: Lane>(
-    joint: &KernelJoint,
+/// The columns of a link, in rows of `p`.
+struct Target<'a, T: Lane> {
+    at: T::At,
     j: usize,
-    map: &WrenchMap<T>,
-    kinematics: &Kinematics<T>,
-    link: &LinkPlan,
+    link: &'a LinkPlan,
     p: usize,
-    rows: &mut [T],
-) {
-    let at = (j, link, p);
-    match (&joint.link, link.wanted) {
-        (
-            LinkPose::Posed {
-                rotation,
-                translation,
-                ..
-            },
-            _,
-        ) => {
-            project_posed(joint, at, map, (rotation, *translation), kinematics, rows);
-        }
-        (_, BASE_XX) => project_along::<T, BASE_XX>(joint, at, map, kinematics, rows),
-        (_, BASE_YY) => project_along::<T, BASE_YY>(joint, at, map, kinematics, rows),
-        (_, ALL) => project_along::<T, ALL>(joint, at, map, kinematics, rows),
-        _ => project_along::<T, ASK>(joint, at, map, kinematics, rows),
-    }
 }
 
-/// Rows of a link whose axes are along those of its joint's frame.
-#[inline(always)]
-fn project_along<T: Lane, const WANTED: u16>(
-    joint: &KernelJoint,
-    (j, link, p): (usize, &LinkPlan, usize),
-    map: &WrenchMap<T>,
-    kinematics: &Kinematics<T>,
-    rows: &mut [T],
-) {
-    let n = kinematics.n;
-    let linear = &kinematics.linear[j * n..][..n];
-    let direction = &kinematics.direction[j * n..][..n];
-    for d in &joint.directions {
-        let v = direction[d.index];
-        let joints = &joint.path[d.range.clone()];
-        let own = d.index + 1 == joint.directions.len();
-        match (d.kind, own, d.across) {
-            (JointKind::Prismatic, _, _) => {
-                let row = &mut rows[joints[0] * p..][..p];
-                for k in 6..10 {
-                    if link.wants::<WANTED>(k) {
-                        link.put(k, row, map.force_entry(k, v));
+impl<T: Lane> Target<'_, T> {
+    /// The rows' entries for the link's columns.
+    #[inline(always)]
+    fn project(
+        &self,
+        joint: &KernelJoint,
+        map: &WrenchMap<T>,
+        kinematics: &Kinematics<T::Cell>,
+        rows: &mut [T::Cell],
+    ) {
+        match (&joint.link, self.link.wanted) {
+            (
+                LinkPose::Posed {
+                    rotation,
+                    translation,
+                    ..
+                },
+                _,
+            ) => self.project_posed(joint, map, (rotation, *translation), kinematics, rows),
+            (_, BASE_XX) => self.project_along::<BASE_XX>(joint, map, kinematics, rows),
+            (_, BASE_YY) => self.project_along::<BASE_YY>(joint, map, kinematics, rows),
+            (_, ALL) => self.project_along::<ALL>(joint, map, kinematics, rows),
+            _ => self.project_along::<ASK>(joint, map, kinematics, rows),
+        }
+    }
+
+    /// Rows of a link whose axes are along those of its joint's frame.
+    #[inline(always)]
+    fn project_along<const WANTED: u16>(
+        &self,
+        joint: &KernelJoint,
+        map: &WrenchMap<T>,
+        kinematics: &Kinematics<T::Cell>,
+        rows: &mut [T::Cell],
+    ) {
+        let (at, n) = (self.at, kinematics.n);
+        let linear = &kinematics.linear[self.j * n..][..n];
+        let direction = &kinematics.direction[self.j * n..][..n];
+        for d in &joint.directions {
+            let v = read(at, &direction[d.index]);
+            let joints = &joint.path[d.range.clone()];
+            let own = d.index + 1 == joint.directions.len();
+            match (d.kind, own, d.across) {
+                (JointKind::Prismatic, _, _) => {
+                    let row = self.row(joints[0], rows);
+                    for k in 6..10 {
+                        if self.link.wants::<WANTED>(k) {
+                            self.link.put(at, k, row, map.force_entry(k, v));
+                        }
                     }
                 }
-            }
-            (_, true, _) => {
-                let below = &joints[..joints.len() - 1];
-                project_direction::<T, ABOUT_Z, WANTED>(below, v, linear, map, (link, p), rows);
-                let row = &mut rows[j * p..][..p];
-                for k in 0..8 {
-                    if link.wants::<WANTED>(k) {
-                        let entry = if k < 6 {
-                            map.tensor_entry::<ABOUT_Z>(k, v)
-                        } else {
-                            map.own_moment_entry(k)
-                        };
-                        link.put(k, row, entry);
+                (_, true, _) => {
+                    let below = &joints[..joints.len() - 1];
+                    self.project_direction::<ABOUT_Z, WANTED>(below, v, linear, map, rows);
+                    let row = self.row(self.j, rows);
+                    for k in 0..8 {
+                        if self.link.wants::<WANTED>(k) {
+                            let entry = if k < 6 {
+                                map.tensor_entry::<ABOUT_Z>(k, v)
+                            } else {
+                                map.own_moment_entry(k)
+                            };
+                            self.link.put(at, k, row, entry);
+                        }
                     }
                 }
+                (_, _, true) => {
+                    self.project_direction::<ACROSS, WANTED>(joints, v, linear, map, rows);
+                }
+                _ => self.project_direction::<ANY, WANTED>(joints, v, linear, map, rows),
             }
-            (_, _, true) => {
-                project_direction::<T, ACROSS, WANTED>(joints, v, linear, map, (link, p), rows);
-            }
-            _ => project_direction::<T, ANY, WANTED>(joints, v, linear, map, (link, p), rows),
         }
     }
-}
 
-/// Rows of parallel revolute joints: what the tensor's columns say is the same in all of them.
-#[inline(always)]
-fn project_direction<T: Lane, const FORM: u8, const WANTED: u16>(
-    joints: &[usize],
-    v: V3<T>,
-    linear: &[V3<T>],
-    map: &WrenchMap<T>,
-    (link, p): (&LinkPlan, usize),
-    rows: &mut [T],
-) {
-    let mut tensor = [T::splat(0.0); 6];
-    for k in 0..6 {
-        if link.wants::<WANTED>(k) {
-            tensor[k] = map.tensor_entry::<FORM>(k, v);
-        }
-    }
-    for &i in joints {
-        let row = &mut rows[i * p..][..p];
-        let f = linear[i];
-        for k in 0..10 {
-            if link.wants::<WANTED>(k) {
-                let entry = if k < 6 {
-                    tensor[k]
-                } else {
-                    map.moment_entry::<FORM>(k, v, f)
-                };
-                link.put(k, row, entry);
+    /// Rows of parallel revolute joints: what the tensor's columns say is the same in all of them.
+    #[inline(always)]
+    fn project_direction<const FORM: u8, const WANTED: u16>(
+        &self,
+        joints: &[usize],
+        v: V3<T>,
+        linear: &[V3<T::Cell>],
+        map: &WrenchMap<T>,
+        rows: &mut [T::Cell],
+    ) {
+        let mut tensor = [v[0]; 6];
+        for k in 0..6 {
+            if self.link.wants::<WANTED>(k) {
+                tensor[k] = map.tensor_entry::<FORM>(k, v);
             }
         }
-    }
-}
-
-/// Rows of a link whose frame stands apart from its joint's.
-#[inline(always)]
-fn project_posed<T: Lane>(
-    joint: &KernelJoint,
-    (j, link, p): (usize, &LinkPlan, usize),
-    map: &WrenchMap<T>,
-    (rotation, translation): (&[[f64; 3]; 3], [f64; 3]),
-    kinematics: &Kinematics<T>,
-    rows: &mut [T],
-) {
-    let map = WrenchMap::new(&map.motion_at(rotation, translation));
-    for d in &joint.directions {
-        for &i in &joint.path[d.range.clone()] {
-            let axis = kinematics.axis(j, d, i).at(rotation, translation);
-            let row = &mut rows[i * p..][..p];
+        for &i in joints {
+            let row = self.row(i, rows);
+            let f = read(self.at, &linear[i]);
             for k in 0..10 {
-                if link.wants::<ASK>(k) {
+                if self.link.wants::<WANTED>(k) {
                     let entry = if k < 6 {
-                        map.tensor_entry::<ANY>(k, axis.angular)
+                        tensor[k]
                     } else {
-                        map.moment_entry::<ANY>(k, axis.angular, axis.linear)
+                        map.moment_entry::<FORM>(k, v, f)
                     };
-                    link.put(k, row, entry);
+                    self.link.put(self.at, k, row, entry);
                 }
             }
         }
+    }
+
+    /// Rows of a link whose frame stands apart from its joint's.
+    #[inline(always)]
+    fn project_posed(
+        &self,
+        joint: &KernelJoint,
+        map: &WrenchMap<T>,
+        (rotation, translation): (&[[f64; 3]; 3], [f64; 3]),
+        kinematics: &Kinematics<T::Cell>,
+        rows: &mut [T::Cell],
+    ) {
+        let map = WrenchMap::new(&map.motion_at(rotation, translation));
+        for d in &joint.directions {
+            for &i in &joint.path[d.range.clone()] {
+                let axis = kinematics.axis::<T>(self.at, self.j, d, i);
+                let axis = axis.at(rotation, translation);
+                let row = self.row(i, rows);
+                for k in 0..10 {
+                    if self.link.wants::<ASK>(k) {
+                        let entry = if k < 6 {
+                            map.tensor_entry::<ANY>(k, axis.angular)
+                        } else {
+                            map.moment_entry::<ANY>(k, axis.angular, axis.linear)
+                        };
+                        self.link.put(self.at, k, row, entry);
+                    }
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn row<'r>(&self, i: usize, rows: &'r mut [T::Cell]) -> &'r mut [T::Cell] {
+        &mut rows[i * self.p..][..self.p]
     }
 }

@@ -1,10 +1,11 @@
 //! The torque regressor: joint torque per unit of each parameter, for one sample and in blocks of eight.
 
-use crate::lane::{F64x8, Lane, dispatch};
+use crate::lane::{Kernel, Lane};
 use crate::model::Model;
 use crate::parameter::Columns;
 use crate::projection::{Kinematics, Plan, fill};
 use crate::states::{JointState, JointStates, LaneStates};
+use crate::wide::{F64x8, over_eight, over_one};
 use nalgebra::DMatrix;
 
 /// Joint torque per unit of each parameter, `n × p`.
@@ -45,12 +46,12 @@ impl RegressorWorkspace {
     pub fn new(model: &Model, columns: &Columns) -> Self {
         Self {
             plan: Plan::new(model, columns),
-            kinematics: Kinematics::new(model),
+            kinematics: Kinematics::new(model, [0.0, 1.0]),
         }
     }
 
     fn fill_rows(&mut self, model: &Model, state: &JointState, rows: &mut [f64]) {
-        dispatch(Fill {
+        over_one(&mut Fill {
             model,
             plan: &self.plan,
             state: [&state.q, &state.qd, &state.qdd],
@@ -106,7 +107,7 @@ impl RegressorBlock {
             n_samples: 0,
             n_joints,
             n_columns,
-            entries: vec![F64x8::splat(0.0); n_joints * n_columns],
+            entries: vec![F64x8::ZERO; n_joints * n_columns],
         }
     }
 
@@ -146,12 +147,12 @@ impl RegressorBlock {
 
     /// One entry of the regressor for the eight samples; beyond `n_samples` the last sample is repeated.
     pub fn lanes(&self, joint: usize, column: usize) -> &[f64; 8] {
-        self.entries[joint * self.n_columns + column].as_array()
+        &self.entries[joint * self.n_columns + column].0
     }
 
     /// One entry for the eight samples, to fill in: of a block of weights.
     pub fn lanes_mut(&mut self, joint: usize, column: usize) -> &mut [f64; 8] {
-        self.entries[joint * self.n_columns + column].as_array_mut()
+        &mut self.entries[joint * self.n_columns + column].0
     }
 
     /// One row of one sample.
@@ -163,7 +164,7 @@ impl RegressorBlock {
         assert_eq!(out.len(), self.n_columns, "a row has one entry a column");
         let row = &self.entries[joint * self.n_columns..][..self.n_columns];
         for (x, e) in out.iter_mut().zip(row) {
-            *x = e.as_array()[lane];
+            *x = e.0[lane];
         }
     }
 }
@@ -211,7 +212,7 @@ impl BlockFiller {
         Self {
             plan: Plan::new(model, columns),
             lanes: LaneStates::new(model.n_joints()),
-            kinematics: Kinematics::new(model),
+            kinematics: Kinematics::new(model, [F64x8::ZERO, F64x8::ONE]),
         }
     }
 
@@ -240,7 +241,7 @@ impl BlockFiller {
             kinematics: &mut self.kinematics,
             rows: &mut block.entries,
         };
-        fill.run();
+        fill.over_eight();
     }
 }
 
@@ -268,28 +269,27 @@ pub fn observation_matrix(model: &Model, columns: &Columns, states: &JointStates
 }
 
 /// [`fill`] as one operation to be compiled for an instruction set.
-pub(crate) struct Fill<'a, T> {
+pub(crate) struct Fill<'a, C> {
     pub(crate) model: &'a Model,
     pub(crate) plan: &'a Plan,
-    pub(crate) state: [&'a [T]; 3],
-    pub(crate) kinematics: &'a mut Kinematics<T>,
-    pub(crate) rows: &'a mut [T],
+    pub(crate) state: [&'a [C]; 3],
+    pub(crate) kinematics: &'a mut Kinematics<C>,
+    pub(crate) rows: &'a mut [C],
 }
 
 impl Fill<'_, F64x8> {
     /// Compiled here once: a generic caller would otherwise be compiled with all of it in every crate.
     #[inline(never)]
-    pub(crate) fn run(self) {
-        dispatch(self);
+    pub(crate) fn over_eight(mut self) {
+        over_eight(&mut self);
     }
 }
 
-impl<T: Lane> pulp::WithSimd for Fill<'_, T> {
-    type Output = ();
-
+impl<C> Kernel<C> for Fill<'_, C> {
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        fill(
+    fn run<T: Lane<Cell = C>>(&mut self, at: T::At) {
+        fill::<T>(
+            at,
             self.model,
             self.plan,
             self.state,

@@ -1,7 +1,7 @@
 //! Joint states: one, and many.
 
-use crate::lane::{F64x8, Lane, dispatch};
 use crate::robot::Robot;
+use crate::wide::F64x8;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -167,7 +167,7 @@ pub(crate) struct LaneStates {
 
 impl LaneStates {
     pub(crate) fn new(n_joints: usize) -> Self {
-        let zeros = vec![F64x8::splat(0.0); n_joints];
+        let zeros = vec![F64x8::ZERO; n_joints];
         Self {
             q: zeros.clone(),
             qd: zeros.clone(),
@@ -181,7 +181,7 @@ impl LaneStates {
     }
 
     pub(crate) fn load(&mut self, states: &JointStates, first: usize) {
-        dispatch(Load {
+        pulp::Arch::new().dispatch(Load {
             lanes: self,
             states,
             first,
@@ -214,11 +214,11 @@ impl pulp::WithSimd for Load<'_> {
 pub(crate) fn eight(x: &[f64], first: usize) -> F64x8 {
     let rest = &x[first..];
     if let Some(full) = rest.first_chunk::<8>() {
-        return F64x8::new(*full);
+        return F64x8(*full);
     }
     let mut few = [rest[rest.len() - 1]; 8];
     few[..rest.len()].copy_from_slice(rest);
-    F64x8::new(few)
+    F64x8(few)
 }
 
 /// Span of a prismatic joint (m) drawn from where the robot states no position limits.

@@ -44,8 +44,19 @@ impl Neg for Dual {
     }
 }
 impl Lane for Dual {
-    fn splat(x: f64) -> Self {
+    type At = ();
+    type Cell = Self;
+    fn splat((): (), x: f64) -> Self {
         dual(x, 0.0)
+    }
+    fn like(self, x: f64) -> Self {
+        dual(x, 0.0)
+    }
+    fn read((): (), cell: &Self) -> Self {
+        *cell
+    }
+    fn write(self, (): (), cell: &mut Self) {
+        *cell = self;
     }
     fn mul_add(self, a: Self, b: Self) -> Self {
         self * a + b
@@ -57,6 +68,16 @@ impl Lane for Dual {
     fn sign(self) -> Self {
         dual(self.re.signum(), 0.0)
     }
+}
+
+/// The instruction sets of this machine the kernels are compiled for.
+pub(crate) fn architectures() -> Vec<pulp::Arch> {
+    let mut all = vec![pulp::Arch::Scalar];
+    #[cfg(target_arch = "x86_64")]
+    all.extend(pulp::x86::V3::try_new().map(pulp::Arch::V3));
+    #[cfg(target_arch = "x86_64")]
+    all.extend(pulp::x86::V4::try_new().map(pulp::Arch::V4));
+    all
 }
 
 /// Any tree of 1 to 8 joints, revolute and prismatic, with generic frames and physical links; and a state for it.

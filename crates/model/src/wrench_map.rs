@@ -54,7 +54,7 @@ impl<T: Lane> WrenchMap<T> {
     /// For a link that turns about z only.
     #[inline(always)]
     pub(crate) fn planar(m: &LinkMotion<T>) -> Self {
-        let o = T::splat(0.0);
+        let o = m.w[2].like(0.0);
         let zz = m.w[2] * m.w[2];
         let dz = m.wd[2];
         Self {
@@ -76,7 +76,7 @@ impl<T: Lane> WrenchMap<T> {
         for (c, &p) in p.iter().enumerate() {
             if p != 0.0 {
                 for k in 0..3 {
-                    a[k] = self.b[k][c].mul_add(T::splat(p), a[k]);
+                    a[k] = self.b[k][c].mul_add(a[k].like(p), a[k]);
                 }
             }
         }

@@ -1,0 +1,250 @@
+//! Eight samples side by side, in the registers of the machine that runs.
+
+use crate::lane::{Kernel, Lane, REDUCTION_LIMIT, sin_cos_large, sin_cos_of_rest};
+use pulp::{Arch, Simd, WithSimd};
+use std::ops::{Add, Mul, Neg, Sub};
+
+/// A number of eight samples in memory, a cache line.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(crate) struct F64x8(pub(crate) [f64; 8]);
+
+impl F64x8 {
+    pub(crate) const ZERO: Self = Self([0.0; 8]);
+    pub(crate) const ONE: Self = Self([1.0; 8]);
+}
+
+/// As many samples as a register holds: eight, four or one.
+///
+/// It carries the proof that the machine has the instructions; every operation is one of them.
+#[derive(Clone, Copy)]
+pub(crate) struct Wide<S: Simd> {
+    simd: S,
+    x: S::f64s,
+}
+
+/// An instruction set, and which register of an [`F64x8`].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Part<S> {
+    simd: S,
+    part: usize,
+}
+
+impl<S: Simd> Wide<S> {
+    /// Registers an [`F64x8`] takes, a power of two.
+    const PARTS: usize = 8 / S::F64_LANES;
+
+    #[inline(always)]
+    fn with(self, x: S::f64s) -> Self {
+        Self { simd: self.simd, x }
+    }
+}
+
+impl<S: Simd> Add for Wide<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        self.with(self.simd.add_f64s(self.x, o.x))
+    }
+}
+
+impl<S: Simd> Sub for Wide<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        self.with(self.simd.sub_f64s(self.x, o.x))
+    }
+}
+
+impl<S: Simd> Mul for Wide<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        self.with(self.simd.mul_f64s(self.x, o.x))
+    }
+}
+
+impl<S: Simd> Neg for Wide<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.with(self.simd.neg_f64s(self.x))
+    }
+}
+
+impl<S: Simd> Lane for Wide<S> {
+    type At = Part<S>;
+    type Cell = F64x8;
+    #[inline(always)]
+    fn splat(at: Part<S>, x: f64) -> Self {
+        Self {
+            simd: at.simd,
+            x: at.simd.splat_f64s(x),
+        }
+    }
+    #[inline(always)]
+    fn like(self, x: f64) -> Self {
+        self.with(self.simd.splat_f64s(x))
+    }
+    #[inline(always)]
+    fn read(at: Part<S>, cell: &F64x8) -> Self {
+        Self {
+            simd: at.simd,
+            // The mask is no change; it spares the check of the index.
+            x: S::as_simd_f64s(&cell.0).0[at.part & (Self::PARTS - 1)],
+        }
+    }
+    #[inline(always)]
+    fn write(self, at: Part<S>, cell: &mut F64x8) {
+        S::as_mut_simd_f64s(&mut cell.0).0[at.part & (Self::PARTS - 1)] = self.x;
+    }
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        self.with(self.simd.mul_add_f64s(self.x, a.x, b.x))
+    }
+    #[inline(always)]
+    fn sin_cos(self, quarters: u64) -> (Self, Self) {
+        let simd = self.simd;
+        let (sine, cosine, shifted) = sin_cos_of_rest(self);
+        // The integer stands in the low bits, where these sums are exact.
+        let turned = simd.add_f64s(shifted.x, simd.splat_f64s(quarters as f64));
+        let next = simd.add_f64s(turned, simd.splat_f64s(1.0));
+        let (turned, next) = (
+            simd.transmute_u64s_f64s(turned),
+            simd.transmute_u64s_f64s(next),
+        );
+        let (one, two, none) = (simd.splat_u64s(1), simd.splat_u64s(2), simd.splat_u64s(0));
+        let even = simd.equal_u64s(simd.and_u64s(turned, one), none);
+        let sine_stays = simd.equal_u64s(simd.and_u64s(turned, two), none);
+        let cosine_stays = simd.equal_u64s(simd.and_u64s(next, two), none);
+        let a = simd.select_f64s(even, sine.x, cosine.x);
+        let b = simd.select_f64s(even, cosine.x, sine.x);
+        let mut s = self.with(simd.select_f64s(sine_stays, a, simd.neg_f64s(a)));
+        let mut c = self.with(simd.select_f64s(cosine_stays, b, simd.neg_f64s(b)));
+        let limit = simd.splat_f64s(REDUCTION_LIMIT);
+        let small = simd.less_than_or_equal_f64s(simd.abs_f64s(self.x), limit);
+        if simd.first_true_m64s(simd.not_m64s(small)) < S::F64_LANES {
+            again_where_large::<S>(&self.x, &mut s.x, &mut c.x, quarters);
+        }
+        (s, c)
+    }
+    #[inline(always)]
+    fn sign(self) -> Self {
+        let simd = self.simd;
+        let (zero, one) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0));
+        let above = simd.select_f64s(simd.greater_than_f64s(self.x, zero), one, zero);
+        let below = simd.select_f64s(simd.less_than_f64s(self.x, zero), one, zero);
+        self.with(simd.sub_f64s(above, below))
+    }
+}
+
+/// Replaces sine and cosine of the angles beyond the reduction's limit; they are rare, and done one by one.
+#[cold]
+#[inline(never)]
+fn again_where_large<S: Simd>(x: &S::f64s, s: &mut S::f64s, c: &mut S::f64s, quarters: u64) {
+    let x: &[f64] = bytemuck::cast_slice(std::slice::from_ref(x));
+    let s: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(s));
+    let c: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(c));
+    for ((&x, s), c) in x.iter().zip(s).zip(c) {
+        if x.abs() <= REDUCTION_LIMIT {
+            continue;
+        }
+        (*s, *c) = sin_cos_large(x, quarters);
+    }
+}
+
+/// Runs a kernel over eight samples with the best instructions of this machine.
+#[inline]
+pub(crate) fn over_eight(kernel: &mut impl Kernel<F64x8>) {
+    over_eight_on(Arch::new(), kernel);
+}
+
+/// The same with these instructions.
+#[inline]
+pub(crate) fn over_eight_on(arch: Arch, kernel: &mut impl Kernel<F64x8>) {
+    arch.dispatch(Eight(kernel));
+}
+
+/// Runs a kernel over one sample, with fused multiply-add where the machine has it.
+#[inline]
+pub(crate) fn over_one(kernel: &mut impl Kernel<f64>) {
+    match Arch::new() {
+        // One sample has no use for wider registers.
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) => Simd::vectorize(*simd, One(kernel)),
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(simd) => Simd::vectorize(simd, One(kernel)),
+        _ => Simd::vectorize(pulp::Scalar, One(kernel)),
+    }
+}
+
+// Structs, not closures: only their own method is certain to be inlined into the function that has the instructions.
+
+struct Eight<'a, K>(&'a mut K);
+
+impl<K: Kernel<F64x8>> WithSimd for Eight<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        for part in 0..Wide::<S>::PARTS {
+            self.0.run::<Wide<S>>(Part { simd, part });
+        }
+    }
+}
+
+struct One<'a, K>(&'a mut K);
+
+impl<K: Kernel<f64>> WithSimd for One<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.0.run::<f64>(());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::architectures;
+    use proptest::prelude::*;
+
+    /// Sine, cosine, sign and the fused product of eight numbers.
+    struct Functions {
+        x: F64x8,
+        quarters: u64,
+        out: [F64x8; 4],
+    }
+
+    impl Kernel<F64x8> for Functions {
+        #[inline(always)]
+        fn run<T: Lane<Cell = F64x8>>(&mut self, at: T::At) {
+            let x = T::read(at, &self.x);
+            let (s, c) = x.sin_cos(self.quarters);
+            let [sine, cosine, sign, fused] = &mut self.out;
+            s.write(at, sine);
+            c.write(at, cosine);
+            x.sign().write(at, sign);
+            s.mul_add(x, -c).write(at, fused);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn identity_eight_lanes_give_the_bits_of_one(x in -10.0..10.0_f64, quarters in 0..4_u64) {
+            let eight = [x, -x, x + 1.0, x - 1.0, x * 0.5, x * 3.0, 1.0e7 * x, 0.0];
+            for arch in architectures() {
+                let mut functions = Functions { x: F64x8(eight), quarters, out: [F64x8::ZERO; 4] };
+                over_eight_on(arch, &mut functions);
+                for (k, x) in eight.into_iter().enumerate() {
+                    let (s, c) = Lane::sin_cos(x, quarters);
+                    let expected = [s, c, Lane::sign(x), s.mul_add(x, -c)];
+                    for (found, expected) in functions.out.iter().zip(expected) {
+                        prop_assert_eq!(found.0[k].to_bits(), expected.to_bits());
+                    }
+                }
+            }
+        }
+    }
+}
