@@ -8,6 +8,7 @@ use crate::logs::{read_logs, read_mapping};
 use crate::output::write_atomically;
 use crate::progress::Progress;
 use crate::report::{identification_text, paper_text, reduction_text, warnings_text};
+use crate::report_html::{file_settings, page_of_logs, shell_line};
 use crate::result::IdentificationResult;
 use crate::structure::{KeepOrder, Structure};
 use crate::{crs_a460, plots, puma};
@@ -131,22 +132,23 @@ fn run_identify(args: &IdentifyArgs, out: &mut dyn Write) -> Result<(), Error> {
         .map_or_else(|| vec![Paper::Puma, Paper::CrsA460], |p| vec![p]);
     for paper in papers {
         let progress = Progress::new();
-        let (text, result, plots) = match paper {
+        let command = command_line();
+        let (text, result, plots, page) = match paper {
             Paper::Puma => {
                 let run = puma::run(args.seed, &progress)?;
-                let plots = run.plots();
-                (run.text, run.result, plots)
+                let (plots, page) = (run.plots(), run.report(&command));
+                (run.text, run.result, plots, page)
             }
             Paper::CrsA460 => {
                 let run = crs_a460::run(args.seed, &progress)?;
-                let plots = run.plots();
-                (run.text, run.result, plots)
+                let (plots, page) = (run.plots(), run.report(&command));
+                (run.text, run.result, plots, page)
             }
         };
         progress.finish();
         let numbers = format!("\nBeside the paper\n{}", paper_text(&result.paper));
         say(out, &(text + &numbers + &warnings_text(&result.warnings)))?;
-        write_results(&args.out, &result, &plots, out)?;
+        write_results(&args.out, &result, &plots, &page, out)?;
     }
     Ok(())
 }
@@ -183,9 +185,11 @@ fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<()
     identification.result.warnings.extend(notes);
     progress.stage("drawing");
     let plots = plots::of_predictions(&identification.predictions, &loaded.robot);
+    let settings = file_settings(robot, &args.log, &args.validate);
+    let page = page_of_logs(&identification, &loaded.robot, &command_line(), &settings);
     progress.finish();
     say(out, &identification_text(&identification))?;
-    write_results(&args.out, &identification.result, &plots, out)
+    write_results(&args.out, &identification.result, &plots, &page, out)
 }
 
 fn run_reduce(args: &ReduceArgs, out: &mut dyn Write) -> Result<(), Error> {
@@ -221,11 +225,17 @@ fn load(robot: &Path, changes: &RobotChanges) -> Result<LoadedRobot, Error> {
 /// One file, name and contents.
 pub type NamedText = (String, String);
 
-/// Writes `DIR/ROBOT/result.json` and the plots, and says where.
+/// What was typed, under the program's own name.
+fn command_line() -> String {
+    shell_line(std::iter::once("idim".to_owned()).chain(std::env::args().skip(1)))
+}
+
+/// Writes `DIR/ROBOT/result.json`, the plots and the report, and says where.
 fn write_results(
     dir: &Path,
     result: &IdentificationResult,
     plots: &[NamedText],
+    page: &str,
     out: &mut dyn Write,
 ) -> Result<(), Error> {
     let folder = dir.join(file_name(&result.robot));
@@ -234,12 +244,13 @@ fn write_results(
     for (name, text) in plots {
         write_atomically(&folder.join(name), text.as_bytes())?;
     }
+    write_atomically(&folder.join("report.html"), page.as_bytes())?;
     write_atomically(&folder.join("result.json"), json.as_bytes())?;
     say(
         out,
         &format!(
-            "\nwrote {} and {} plots beside it\n\n",
-            folder.join("result.json").display(),
+            "\nopen {}; result.json and {} plots lie beside it\n\n",
+            folder.join("report.html").display(),
             plots.len()
         ),
     )

@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::identify::{Prediction, errors, joint_names};
 use crate::plots;
 use crate::progress::Progress;
+use crate::report_html::page_of_paper;
 use crate::result::IdentificationResult;
 use crate::simulate::{Differentiation, Disturbances, Experiment, Processing, Recovered};
 use crate::structure::{KeepOrder, Structure};
@@ -40,6 +41,21 @@ impl CrsRun {
         let mut plots = plots::of_predictions(&self.predictions, &self.robot);
         plots.extend(self.motion_plots());
         plots
+    }
+
+    /// `report.html`.
+    pub(crate) fn report(&self, command: &str) -> String {
+        let titles = self.motions.iter().map(|m| format!("Motion: {}", m.title));
+        let plots = self.motion_plots().into_iter().map(|(_, svg)| svg);
+        let figures: Vec<NamedText> = titles.zip(plots).collect();
+        page_of_paper(
+            "Radkhah, Kulić & Croft 2007",
+            &self.result,
+            &self.robot,
+            &self.predictions,
+            &figures,
+            command,
+        )
     }
 
     fn motion_plots(&self) -> Vec<NamedText> {

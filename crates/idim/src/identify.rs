@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::load::LoadedRobot;
+use crate::report_html::{LogSummary, Spectrum, summaries};
 use crate::result::{
     ConditionResult, ErrorResult, EstimateResult, IdentificationResult, JointError,
     ParameterResult, SCHEMA,
@@ -15,7 +16,7 @@ use idim_estimation::{
     factor_of, solve, weighted_least_squares_dense,
 };
 use idim_measurement::Measurements;
-use idim_model::{Columns, DriveColumns, Robot};
+use idim_model::{Columns, DriveColumns, ParameterKind, Robot};
 
 /// What one run is asked for.
 #[derive(Debug, Clone)]
@@ -42,6 +43,17 @@ pub struct Prediction {
     pub measured: Vec<Vec<f64>>,
     /// As predicted, joint by joint, N·m.
     pub predicted: Vec<Vec<f64>>,
+    /// What of it is friction, where the model has some.
+    pub friction: Option<FrictionPart>,
+}
+
+/// The friction of a predicted torque over the velocity, joint by joint.
+#[derive(Debug, Clone)]
+pub struct FrictionPart {
+    /// Velocity of the joint, rad/s (m/s).
+    pub velocity: Vec<Vec<f64>>,
+    /// Torque of everything that is neither inertia nor weight, N·m (N).
+    pub torque: Vec<Vec<f64>>,
 }
 
 /// Everything an identification from logs found.
@@ -53,6 +65,10 @@ pub struct Identification {
     pub joints: Vec<String>,
     /// Torques over time, training stretches first.
     pub predictions: Vec<Prediction>,
+    /// The logs as read.
+    pub logs: Vec<LogSummary>,
+    /// Singular values of the rows the estimate was made from.
+    pub spectrum: Spectrum,
 }
 
 /// Identifies a robot from its logs.
@@ -74,6 +90,7 @@ pub fn identify(
     for m in &training {
         warnings.extend(idim_measurement::check_motion(m, robot)?);
     }
+    let logs = summaries(&training, &validation);
     let (training, validation) = if validation.is_empty() {
         training.iter().map(split).unzip()
     } else {
@@ -102,6 +119,7 @@ pub fn identify(
             time: s.time.clone(),
             measured: s.torque.clone(),
             predicted: predict(robot, &fit.columns, &fit.values, s, &plan),
+            friction: Some(friction_part(robot, &fit, s, &plan)),
         })
         .collect();
     let joints = joint_names(robot);
@@ -123,7 +141,24 @@ pub fn identify(
         result,
         joints,
         predictions,
+        logs,
+        spectrum: fit.spectrum,
     })
+}
+
+/// The prediction with every inertial parameter set to zero.
+fn friction_part(robot: &Robot, fit: &Fit, stretch: &Stretch, plan: &SamplingPlan) -> FrictionPart {
+    let inertial = |k: ParameterKind| k.inertial_index().is_some() || k == ParameterKind::Ia;
+    let columns = fit.columns.0.iter().zip(&fit.values);
+    let friction: Vec<f64> = columns
+        .map(|(c, &v)| if inertial(c.kind) { 0.0 } else { v })
+        .collect();
+    FrictionPart {
+        velocity: (0..robot.n_joints())
+            .map(|j| stretch.states.qd(j).to_vec())
+            .collect(),
+        torque: predict(robot, &fit.columns, &friction, stretch, plan),
+    }
 }
 
 /// The first part trains, the rest validates; cut before anything is filtered, so that nothing leaks.
@@ -143,6 +178,7 @@ struct Fit {
     values: Vec<f64>,
     result: EstimateResult,
     warnings: Vec<String>,
+    spectrum: Spectrum,
     /// Sum over the joints of the logarithm of the residual's standard deviation: smaller fits better.
     misfit: f64,
 }
@@ -154,6 +190,7 @@ impl Fit {
             values: solved.estimate.values.clone(),
             result: estimate_result(solved, names),
             warnings,
+            spectrum: solved.spectrum.clone(),
             misfit: solved.misfit,
         }
     }
@@ -203,12 +240,16 @@ struct Solved {
     estimate: Estimate,
     condition: ConditionResult,
     method: &'static str,
+    spectrum: Spectrum,
     misfit: f64,
 }
 
 /// Weighted by the noise of the joints; ordinary where the weights themselves make the rows dependent, as those of a
 /// joint that is fitted exactly do. `None` where the columns are dependent.
 fn solved(rows: &Rows, n_columns: usize, n_joints: usize) -> Result<Option<Solved>, Error> {
+    let w = MatRef::from_row_major_slice(&rows.w, rows.y.len(), n_columns);
+    let factor = factor_of(w, &rows.y)?;
+    let spectrum = Spectrum::of_factor(&factor);
     if let WeightedSolution::Determined(fit) = weighted(rows, n_columns, n_joints)? {
         let noise = fit.noise.standard_deviation();
         return Ok(Some(Solved {
@@ -219,11 +260,11 @@ fn solved(rows: &Rows, n_columns: usize, n_joints: usize) -> Result<Option<Solve
             },
             estimate: fit.estimate,
             method: "weighted least squares, one variance a joint, iterated",
+            spectrum,
             misfit: noise.iter().map(|s| s.ln()).sum(),
         }));
     }
-    let w = MatRef::from_row_major_slice(&rows.w, rows.y.len(), n_columns);
-    let Solution::Determined(estimate) = solve(&factor_of(w, &rows.y)?)? else {
+    let Solution::Determined(estimate) = solve(&factor)? else {
         return Ok(None);
     };
     Ok(Some(Solved {
@@ -235,6 +276,7 @@ fn solved(rows: &Rows, n_columns: usize, n_joints: usize) -> Result<Option<Solve
         misfit: n_joints as f64 * estimate.sigma.ln(),
         estimate,
         method: "ordinary least squares: a joint without residual has no weight",
+        spectrum,
     }))
 }
 

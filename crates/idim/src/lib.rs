@@ -18,6 +18,7 @@ mod plots;
 mod progress;
 pub mod puma;
 pub mod report;
+pub mod report_html;
 mod result;
 mod samples;
 pub mod simulate;
@@ -26,7 +27,9 @@ mod table;
 mod transmission;
 
 pub use error::Error;
-pub use identify::{Identification, IdentifyOptions, Prediction, TRAINING_SHARE, identify};
+pub use identify::{
+    FrictionPart, Identification, IdentifyOptions, Prediction, TRAINING_SHARE, identify,
+};
 pub use load::{Changes, LoadedRobot, load_robot};
 pub use log_spec::LogSpec;
 pub use output::write_atomically;

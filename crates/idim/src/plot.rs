@@ -7,6 +7,8 @@ mod canvas;
 mod motion;
 mod series;
 
+pub(crate) use series::side_by_side;
+
 pub use motion::motion_plot;
 
 use canvas::{
@@ -17,7 +19,7 @@ use idim_model::JointKind;
 use plotters::element::{EmptyElement, Rectangle, Text};
 use plotters::series::LineSeries;
 use plotters::style::Color;
-use series::{decimate, padded_range, rms, side_by_side};
+use series::{decimate, padded_range, rms};
 
 /// What a run of samples was used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,6 +9,7 @@ use crate::noise_study::noise_study;
 use crate::papers::gautier_khalil;
 use crate::plots;
 use crate::progress::Progress;
+use crate::report_html::page_of_paper;
 use crate::result::IdentificationResult;
 use crate::samples::visit_rows;
 use crate::structure::{KeepOrder, Structure};
@@ -55,6 +56,28 @@ impl PumaRun {
         let mut plots = plots::of_predictions(std::slice::from_ref(&self.torques), &self.robot);
         plots.extend(plots::of_path(&self.robot, &self.path, &self.path_limits));
         plots
+    }
+
+    /// `report.html`.
+    pub(crate) fn report(&self, command: &str) -> String {
+        let figures = plots::of_path(&self.robot, &self.path, &self.path_limits);
+        let figures: Vec<NamedText> = figures
+            .into_iter()
+            .map(|(_, svg)| {
+                (
+                    "Path through the exciting points, within its limits".into(),
+                    svg,
+                )
+            })
+            .collect();
+        page_of_paper(
+            "Gautier & Khalil 1991",
+            &self.result,
+            &self.robot,
+            std::slice::from_ref(&self.torques),
+            &figures,
+            command,
+        )
     }
 }
 
@@ -229,6 +252,7 @@ fn energy_prediction(
         time: (0..w.nrows()).map(|i| i as f64).collect(),
         measured: vec![product(x)],
         predicted: vec![product(estimate)],
+        friction: None,
     }
 }
 
@@ -262,5 +286,6 @@ fn torque_prediction(
         time: times,
         measured,
         predicted,
+        friction: None,
     }
 }

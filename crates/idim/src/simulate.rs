@@ -136,6 +136,7 @@ impl Recovered {
             time: times.to_vec(),
             measured: self.torque.clone(),
             predicted,
+            friction: None,
         }
     }
 

@@ -65,7 +65,7 @@ pub(super) fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// Times of the runs, each moved behind the one before where their clocks overlap, and whether any was moved.
-pub(super) fn side_by_side(runs: &[TorqueRun]) -> (Vec<Vec<f64>>, bool) {
+pub(crate) fn side_by_side(runs: &[TorqueRun]) -> (Vec<Vec<f64>>, bool) {
     let mut times: Vec<Vec<f64>> = Vec::with_capacity(runs.len());
     let mut end = f64::NEG_INFINITY;
     let mut shifted = false;

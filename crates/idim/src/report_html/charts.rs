@@ -1,0 +1,310 @@
+//! The curves of the page as numbers in JSON, thinned to what an eye can use.
+
+use super::data::{CutoffCurve, ReportData, Spectrum, drive_words, position_unit};
+use crate::plot::{Part, TorqueRun, side_by_side};
+use serde::Serialize;
+
+/// Samples drawn over all joints; more are thinned. Three curves at some four bytes a number make two megabytes.
+const SAMPLES: usize = 150_000;
+/// Dots of a friction picture.
+const DOTS: usize = 2500;
+/// Steps between lowest and highest value of a curve: far finer than a pixel even when zoomed.
+const LEVELS: f64 = 32_000.0;
+/// The same of times: one sample of a long log is told from the next.
+const TIME_LEVELS: f64 = 16_000_000.0;
+
+/// One picture: panels above each other over the same axis.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Chart {
+    x_label: String,
+    /// Charts of one link are zoomed together.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    link: Option<&'static str>,
+    /// Room on both sides, as a share of the range.
+    pad: f64,
+    /// What the curves stand over; each names one by its position.
+    x: Vec<Coded>,
+    panels: Vec<Panel>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Panel {
+    y_label: String,
+    log: bool,
+    height: u32,
+    series: Vec<Series>,
+    /// Held-out spans of the axis.
+    bands: Vec<[f64; 2]>,
+    marks: Vec<Mark>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Series {
+    name: &'static str,
+    class: &'static str,
+    mode: &'static str,
+    x: usize,
+    y: Coded,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Mark {
+    x: f64,
+    label: String,
+}
+
+/// Numbers as whole steps from one to the next.
+#[derive(Debug, Clone, Serialize)]
+struct Coded {
+    from: f64,
+    step: f64,
+    d: Vec<i64>,
+}
+
+impl Coded {
+    fn new(values: impl Iterator<Item = f64> + Clone, levels: f64) -> Self {
+        let (low, high) = values
+            .clone()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| {
+                (a.min(v), b.max(v))
+            });
+        let step = if high > low {
+            (high - low) / levels
+        } else {
+            1.0
+        };
+        let mut last = 0;
+        let d = values
+            .map(|v| {
+                let k = ((v - low) / step).round() as i64;
+                k - std::mem::replace(&mut last, k)
+            })
+            .collect();
+        Self {
+            from: if low.is_finite() { low } else { 0.0 },
+            step,
+            d,
+        }
+    }
+}
+
+/// Measured and predicted torque of one joint, the residual below.
+pub(super) fn torque_chart(data: &ReportData, joint: usize) -> Chart {
+    let (quantity, unit) = drive_words(data.robot.joints()[joint].kind);
+    let runs: Vec<TorqueRun> = data
+        .predictions
+        .iter()
+        .map(|p| TorqueRun {
+            part: if p.training {
+                Part::Training
+            } else {
+                Part::Validation
+            },
+            time: &p.time,
+            measured: &p.measured[joint],
+            predicted: &p.predicted[joint],
+        })
+        .collect();
+    let (times, shifted) = side_by_side(&runs);
+    let total: usize = runs.iter().map(|r| r.time.len()).sum();
+    let budget = SAMPLES / data.robot.n_joints();
+    let mut x = Vec::new();
+    let mut upper = Vec::new();
+    let mut lower = Vec::new();
+    let mut bands = Vec::new();
+    for (run, time) in runs.iter().zip(&times) {
+        let residual: Vec<f64> = run
+            .measured
+            .iter()
+            .zip(run.predicted)
+            .map(|(m, p)| m - p)
+            .collect();
+        let kept = thin(
+            &[run.measured, &residual],
+            budget * time.len() / total.max(1),
+        );
+        let pick = |v: &[f64], levels| {
+            let values: Vec<f64> = kept.iter().map(|&k| v[k]).collect();
+            Coded::new(values.iter().copied(), levels)
+        };
+        let line = |name, class, v: &[f64]| Series {
+            name,
+            class,
+            mode: "line",
+            x: x.len(),
+            y: pick(v, LEVELS),
+        };
+        upper.push(line("measured", "a", run.measured));
+        upper.push(line("predicted", "b", run.predicted));
+        lower.push(line("residual", "c", &residual));
+        x.push(pick(time, TIME_LEVELS));
+        if let (Part::Validation, Some(&a), Some(&b)) = (run.part, time.first(), time.last()) {
+            bands.push([a, b]);
+        }
+    }
+    let panel = |y_label, height, series| Panel {
+        y_label,
+        log: false,
+        height,
+        series,
+        bands: bands.clone(),
+        marks: Vec::new(),
+    };
+    Chart {
+        x_label: if shifted {
+            "time / s (runs one after another)".into()
+        } else {
+            "time / s".into()
+        },
+        link: Some("time"),
+        pad: 0.0,
+        x,
+        panels: vec![
+            panel(format!("{quantity} / {unit}"), 210, upper),
+            panel(format!("residual / {unit}"), 110, lower),
+        ],
+    }
+}
+
+/// Positions of at most about `most` samples that keep the extremes of every curve; samples that are not finite are left out.
+fn thin(curves: &[&[f64]], most: usize) -> Vec<usize> {
+    let n = curves.first().map_or(0, |c| c.len());
+    let finite: Vec<usize> = (0..n)
+        .filter(|&k| curves.iter().all(|c| c[k].is_finite()))
+        .collect();
+    if finite.len() <= most {
+        return finite;
+    }
+    let stretches = (most / (2 * curves.len())).max(1);
+    let mut kept = Vec::with_capacity(most);
+    for stretch in finite.chunks(finite.len().div_ceil(stretches)) {
+        let mut extremes = Vec::with_capacity(2 * curves.len());
+        for c in curves {
+            extremes.extend(
+                stretch
+                    .iter()
+                    .copied()
+                    .min_by(|&a, &b| c[a].total_cmp(&c[b])),
+            );
+            extremes.extend(
+                stretch
+                    .iter()
+                    .copied()
+                    .max_by(|&a, &b| c[a].total_cmp(&c[b])),
+            );
+        }
+        extremes.sort_unstable();
+        extremes.dedup();
+        kept.extend(extremes);
+    }
+    kept
+}
+
+/// Friction of one joint over its velocity: what the model leaves for friction, and the friction it has.
+pub(super) fn friction_chart(data: &ReportData, joint: usize) -> Option<Chart> {
+    let kind = data.robot.joints()[joint].kind;
+    let (quantity, unit) = drive_words(kind);
+    let total: usize = data
+        .predictions
+        .iter()
+        .filter(|p| p.friction.is_some())
+        .map(|p| p.time.len())
+        .sum();
+    let every = total.div_ceil(DOTS).max(1);
+    let (mut velocity, mut seen, mut model) = (Vec::new(), Vec::new(), Vec::new());
+    for p in data.predictions {
+        let Some(friction) = &p.friction else {
+            continue;
+        };
+        for k in (0..p.time.len()).step_by(every) {
+            let f = friction.torque[joint][k];
+            let left = p.measured[joint][k] - p.predicted[joint][k] + f;
+            if left.is_finite() && f.is_finite() {
+                velocity.push(friction.velocity[joint][k]);
+                seen.push(left);
+                model.push(f);
+            }
+        }
+    }
+    let dots = |name, class, v: Vec<f64>| Series {
+        name,
+        class,
+        mode: "dots",
+        x: 0,
+        y: Coded::new(v.into_iter(), LEVELS),
+    };
+    (!velocity.is_empty() && model.iter().any(|f| *f != 0.0)).then(|| Chart {
+        x_label: format!("velocity / ({}/s)", position_unit(kind)),
+        link: None,
+        pad: 0.03,
+        x: vec![Coded::new(velocity.into_iter(), LEVELS)],
+        panels: vec![Panel {
+            y_label: format!("friction {quantity} / {unit}"),
+            log: false,
+            height: 210,
+            series: vec![
+                dots("from the data", "a", seen),
+                dots("of the model", "b", model),
+            ],
+            bands: Vec::new(),
+            marks: Vec::new(),
+        }],
+    })
+}
+
+/// Singular values over their number.
+pub(super) fn spectrum_chart(spectrum: &Spectrum) -> Option<Chart> {
+    let line = |name, class, v: &[f64]| Series {
+        name,
+        class,
+        mode: "both",
+        x: 0,
+        // The smallest double keeps a zero on the page.
+        y: Coded::new(v.iter().map(|s| s.max(f64::MIN_POSITIVE).log10()), LEVELS),
+    };
+    let n = spectrum.raw.len();
+    (n > 0 && spectrum.equilibrated.len() == n).then(|| Chart {
+        x_label: "number of the singular value".into(),
+        link: None,
+        pad: 0.02,
+        x: vec![Coded::new((1..=n).map(|k| k as f64), (n.max(2) - 1) as f64)],
+        panels: vec![Panel {
+            y_label: "singular value".into(),
+            log: true,
+            height: 210,
+            series: vec![
+                line("of W in SI units", "b", &spectrum.raw),
+                line("with unit columns", "c", &spectrum.equilibrated),
+            ],
+            bands: Vec::new(),
+            marks: Vec::new(),
+        }],
+    })
+}
+
+/// Held-out error over the cutoff.
+pub(super) fn cutoff_chart(curve: &CutoffCurve) -> Chart {
+    Chart {
+        x_label: "cutoff of the low-pass / Hz".into(),
+        link: None,
+        pad: 0.03,
+        x: vec![Coded::new(curve.cutoff.iter().copied(), TIME_LEVELS)],
+        panels: vec![Panel {
+            y_label: "held-out error / %".into(),
+            log: false,
+            height: 210,
+            series: vec![Series {
+                name: "held-out error",
+                class: "c",
+                mode: "both",
+                x: 0,
+                y: Coded::new(curve.error.iter().map(|e| 100.0 * e), LEVELS),
+            }],
+            bands: Vec::new(),
+            marks: vec![Mark {
+                x: curve.chosen,
+                label: "taken".into(),
+            }],
+        }],
+    }
+}

@@ -1,0 +1,398 @@
+//! The chapters about torques, data, robot and the way to run it again.
+
+use super::blocks::{Block, Cell, figures as digits, word};
+use super::charts::{cutoff_chart, friction_chart, spectrum_chart, torque_chart};
+use super::data::{LogSummary, ReportData, drive_words, position_unit};
+use super::verdict::{low_r2, quoted};
+use crate::result::JointError;
+use crate::table::{number, optional};
+use idim_model::{Joint, JointKind};
+
+pub(super) fn paper(data: &ReportData) -> Vec<Block> {
+    let numbers = &data.result.paper;
+    if numbers.is_empty() {
+        return Vec::new();
+    }
+    let header = vec![
+        word("number"),
+        digits("printed"),
+        digits("ours"),
+        word("note"),
+    ];
+    let rows = numbers.iter().map(|n| {
+        vec![
+            word(&n.what),
+            digits(optional(n.printed)),
+            digits(number(n.ours)),
+            word(&n.note),
+        ]
+    });
+    vec![Block::table(
+        "Our numbers beside the printed ones",
+        header,
+        rows.collect(),
+    )]
+}
+
+const TORQUES: &[(&str, &str)] = &[("a", "measured"), ("b", "predicted"), ("c", "residual")];
+
+pub(super) fn torque(data: &ReportData) -> Vec<Block> {
+    if data.predictions.is_empty() {
+        return Vec::new();
+    }
+    let (train, held_out) = (&data.result.train, &data.result.validation);
+    let mut blocks = Vec::new();
+    blocks.extend(held_out.as_ref().map(|e| {
+        errors_table(
+            "Held-out motion, not seen by the estimate",
+            &e.joints,
+            data,
+            false,
+        )
+    }));
+    blocks.extend(
+        train
+            .as_ref()
+            .map(|e| errors_table("Training motion", &e.joints, data, true)),
+    );
+    blocks.push(Block::Soft(
+        "Drag over a picture to zoom, double-click to see all; with the keyboard + − ← → and 0. All joints move together. Shaded spans were held out.".into(),
+    ));
+    for (j, joint) in data.robot.joints().iter().enumerate() {
+        let (quantity, unit) = drive_words(joint.kind);
+        let about = format!(
+            "Measured and predicted {quantity} ({unit}) over time, and the residual below. {}",
+            quoted(data, j, unit)
+        );
+        blocks.push(Block::figure(
+            format!("torque-{}", j + 1),
+            &joint.name,
+            about,
+            TORQUES,
+            &torque_chart(data, j),
+        ));
+    }
+    blocks
+}
+
+fn errors_table(caption: &str, joints: &[JointError], data: &ReportData, training: bool) -> Block {
+    // An energy model has one error for all joints.
+    let per_joint = joints.len() == data.robot.n_joints();
+    let mut header = vec![
+        word("joint"),
+        digits("rms of the residual"),
+        digits("relative error %"),
+        digits("R2"),
+    ];
+    if per_joint {
+        header.push(digits("largest residual"));
+    }
+    let row = |(j, e): (usize, &JointError)| {
+        let unit = if per_joint {
+            drive_words(data.robot.joints()[j].kind).1
+        } else {
+            "J"
+        };
+        let mut cells = vec![
+            word(&e.name),
+            digits(format!("{} {unit}", number(e.rms))),
+            digits(format!("{:.2}", 100.0 * e.relative_error)),
+            Cell {
+                low: low_r2(e.r2),
+                ..digits(format!("{:.4}", e.r2))
+            },
+        ];
+        if per_joint {
+            cells.push(digits(format!(
+                "{} {unit}",
+                number(largest_residual(data, j, training))
+            )));
+        }
+        cells
+    };
+    Block::table(
+        caption,
+        header,
+        joints.iter().enumerate().map(row).collect(),
+    )
+}
+
+fn largest_residual(data: &ReportData, joint: usize, training: bool) -> f64 {
+    let parts = data.predictions.iter().filter(|p| p.training == training);
+    parts
+        .flat_map(|p| p.measured[joint].iter().zip(&p.predicted[joint]))
+        .fold(0.0, |largest, (m, p)| f64::max(largest, (m - p).abs()))
+}
+
+pub(super) fn friction(data: &ReportData) -> Vec<Block> {
+    let mut blocks: Vec<Block> = Vec::new();
+    for (j, joint) in data.robot.joints().iter().enumerate() {
+        if let Some(chart) = friction_chart(data, j) {
+            let keys = &[("a", "from the data"), ("b", "of the model")];
+            blocks.push(Block::figure(
+                format!("friction-{}", j + 1),
+                &joint.name,
+                "Friction over the velocity of the joint.",
+                keys,
+                &chart,
+            ));
+        }
+    }
+    if !blocks.is_empty() {
+        blocks.insert(0, Block::Soft(
+            "Dots from the data: measured torque less everything the model predicts but friction. Dots of the model: its friction at the same samples.".into(),
+        ));
+    }
+    blocks
+}
+
+pub(super) fn condition(data: &ReportData) -> Vec<Block> {
+    let Some(estimate) = &data.result.estimate else {
+        return Vec::new();
+    };
+    let c = &estimate.condition_number;
+    let row = |name, value, meaning| vec![word(name), digits(optional(value)), word(meaning)];
+    let rows = vec![
+        row("raw", c.raw, "of W in SI units; depends on the units"),
+        row(
+            "equilibrated",
+            c.equilibrated,
+            "of W with unit columns; up to about 100 is well excited",
+        ),
+        row(
+            "weighted",
+            c.weighted,
+            "of W with its rows whitened by the noise of the joints",
+        ),
+    ];
+    let header = vec![word("condition number"), digits("value"), word("meaning")];
+    let mut blocks = vec![Block::table(
+        "2-norm condition numbers of the rows the estimate was made from",
+        header,
+        rows,
+    )];
+    if let Some(chart) = data.spectrum.and_then(spectrum_chart) {
+        let about = "Singular values of the rows on a logarithmic axis, falling; a steep end is a combination the motion hardly shows.";
+        let keys = &[("b", "of W in SI units"), ("c", "with unit columns")];
+        blocks.push(Block::figure(
+            "spectrum",
+            "Singular values",
+            about,
+            keys,
+            &chart,
+        ));
+    }
+    blocks
+}
+
+pub(super) fn data(data: &ReportData) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    if !data.logs.is_empty() {
+        blocks.extend(logs_tables(data));
+    }
+    if !data.result.conditioning.is_empty() {
+        blocks.push(Block::Heading("How the log became samples".into()));
+        blocks.push(Block::List(data.result.conditioning.clone()));
+    }
+    if let Some(curve) = data.cutoff {
+        let about = format!(
+            "Error on held-out blocks over the cutoff; taken: {} Hz.",
+            number(curve.chosen)
+        );
+        blocks.push(Block::figure(
+            "cutoff",
+            "Choice of the low-pass",
+            about,
+            &[("c", "held-out error")],
+            &cutoff_chart(curve),
+        ));
+    }
+    blocks
+}
+
+fn logs_tables(data: &ReportData) -> [Block; 2] {
+    let header = vec![
+        word("file"),
+        word("use"),
+        digits("samples"),
+        digits("duration / s"),
+        digits("rate / Hz"),
+        word("velocities"),
+    ];
+    let row = |l: &LogSummary| {
+        vec![
+            word(&l.file),
+            word(if l.training { "training" } else { "held out" }),
+            digits(l.n_samples.to_string()),
+            digits(format!("{:.2}", l.duration)),
+            digits(number(l.rate)),
+            word(if l.has_velocity {
+                "recorded"
+            } else {
+                "from positions"
+            }),
+        ]
+    };
+    let logs = Block::table("Logs", header, data.logs.iter().map(row).collect());
+    let header = vec![
+        word("joint"),
+        digits("lowest"),
+        digits("highest"),
+        digits("largest torque or force"),
+    ];
+    let rows = data
+        .robot
+        .joints()
+        .iter()
+        .enumerate()
+        .map(|(j, joint)| moved(data, j, joint));
+    [
+        logs,
+        Block::table("How far the joints moved", header, rows.collect()),
+    ]
+}
+
+fn moved(data: &ReportData, j: usize, joint: &Joint) -> Vec<Cell> {
+    let [low, high] = data
+        .logs
+        .iter()
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], l| {
+            [a.min(l.position[j][0]), b.max(l.position[j][1])]
+        });
+    let torque = data.logs.iter().fold(0.0_f64, |a, l| a.max(l.torque[j]));
+    let unit = position_unit(joint.kind);
+    vec![
+        word(&joint.name),
+        digits(format!("{} {unit}", number(low))),
+        digits(format!("{} {unit}", number(high))),
+        digits(format!("{} {}", number(torque), drive_words(joint.kind).1)),
+    ]
+}
+
+pub(super) fn doctor(data: &ReportData) -> Vec<Block> {
+    let Some(findings) = data.findings else {
+        return Vec::new();
+    };
+    if findings.is_empty() {
+        return vec![Block::Text("Nothing wrong was found.".into())];
+    }
+    let header = ["code", "weight", "where", "met", "rule and next step"]
+        .map(word)
+        .into();
+    let rows = findings.iter().map(|f| {
+        let weight = if f.grave { "grave, waived" } else { "remark" };
+        [f.code.as_str(), weight, &f.place, &f.met, &f.rule]
+            .map(word)
+            .into()
+    });
+    vec![Block::table(
+        "What was found before anything was computed",
+        header,
+        rows.collect(),
+    )]
+}
+
+pub(super) fn tried(data: &ReportData) -> Vec<Block> {
+    let mut blocks = Vec::new();
+    // Whatever reads as a number stands to the right.
+    let cell = |text: &String| Cell {
+        number: text.trim_end_matches(" *").parse::<f64>().is_ok(),
+        ..word(text)
+    };
+    for t in data.tables {
+        blocks.push(Block::Heading(t.title.clone()));
+        let header = t.header.iter().enumerate().map(|(k, h)| Cell {
+            number: t
+                .rows
+                .first()
+                .is_some_and(|row| row.get(k).is_some_and(|c| cell(c).number)),
+            ..word(h)
+        });
+        let rows = t.rows.iter().map(|row| row.iter().map(cell).collect());
+        blocks.push(Block::table(&t.about, header.collect(), rows.collect()));
+    }
+    blocks
+}
+
+pub(super) fn figures(data: &ReportData) -> Vec<Block> {
+    let pictures = data.figures.iter();
+    pictures
+        .map(|(title, svg)| Block::Picture(title.clone(), svg.clone()))
+        .collect()
+}
+
+pub(super) fn robot(data: &ReportData) -> Vec<Block> {
+    let g = data.robot.gravity();
+    let range = |j: &Joint| {
+        j.limits.position.map_or_else(
+            || "-".into(),
+            |[a, b]| format!("{} to {} {}", number(a), number(b), position_unit(j.kind)),
+        )
+    };
+    let header = vec![
+        word("joint"),
+        word("moves"),
+        word("link"),
+        word("range"),
+        digits("gear ratio"),
+        word("inertia in the file"),
+    ];
+    let rows = data
+        .robot
+        .joints()
+        .iter()
+        .zip(data.robot.links())
+        .map(|(joint, link)| {
+            vec![
+                word(&joint.name),
+                word(match joint.kind {
+                    JointKind::Revolute => "turns",
+                    JointKind::Prismatic => "slides",
+                }),
+                word(&link.name),
+                word(range(joint)),
+                digits(optional(joint.actuator.gear_ratio)),
+                word(if link.inertial.is_some() {
+                    "stated"
+                } else {
+                    "not known"
+                }),
+            ]
+        });
+    let mut blocks = vec![
+        Block::Text(format!(
+            "Gravity in the base frame: ({}, {}, {}) m/s².",
+            g.x, g.y, g.z
+        )),
+        Block::table("Joints and links", header, rows.collect()),
+    ];
+    if !data.robot.notes().is_empty() {
+        blocks.push(Block::List(data.robot.notes().to_vec()));
+    }
+    blocks
+}
+
+pub(super) fn again(data: &ReportData) -> Vec<Block> {
+    let r = data.result;
+    let mut rows = vec![
+        vec![word("idim"), word(format!("{} ({})", r.version, r.schema))],
+        vec![word("seed"), word(r.seed.to_string())],
+    ];
+    rows.extend(
+        data.settings
+            .iter()
+            .map(|(name, value)| vec![word(name), word(value)]),
+    );
+    vec![
+        Block::Code(data.command.to_owned()),
+        Block::table(
+            "Settings and versions",
+            vec![word("setting"), word("value")],
+            rows,
+        ),
+        Block::Soft(
+            "Same files, options and version give the same bits, whatever the number of threads."
+                .into(),
+        ),
+    ]
+}
