@@ -1,6 +1,6 @@
 //! What the numbers mean, in plain words.
 
-use super::data::ReportData;
+use super::data::{ReportData, ReportedFinding};
 use crate::result::{ErrorResult, EstimateResult, IdentificationResult};
 use crate::table::number;
 
@@ -72,19 +72,26 @@ pub(super) fn verdict(data: &ReportData) -> PlainVerdict {
         points.extend(of_parameters(r, estimate));
         points.extend(of_condition(estimate, data.paper.is_some()));
     }
-    if let Some(findings) = data.findings {
-        let grave = findings.iter().filter(|f| f.grave).count();
-        points.push(match (findings.len(), grave) {
-            (0, _) => "The log doctor found nothing wrong with the data.".into(),
-            (n, 0) => format!("The log doctor made {n} remarks on the data, none of which spoils the result."),
-            (n, g) => format!("The log doctor made {n} remarks; {g} of them would spoil the result and were waived by name."),
-        });
-    }
+    points.extend(data.findings.map(of_findings));
     PlainVerdict {
         level,
         word,
         headline,
         points,
+    }
+}
+
+fn of_findings(findings: &[ReportedFinding]) -> String {
+    let remarks = match findings.len() {
+        0 => return "The log doctor found nothing wrong with the data.".into(),
+        1 => "one remark".to_owned(),
+        n => format!("{n} remarks"),
+    };
+    match findings.iter().filter(|f| f.grave).count() {
+        0 => format!("The log doctor made {remarks} on the data, none that spoils the result."),
+        g => format!(
+            "The log doctor made {remarks} on the data; {g} would spoil the result and had to be waived by name."
+        ),
     }
 }
 
