@@ -10,6 +10,7 @@ use crate::progress::Progress;
 use crate::report::{identification_text, paper_text, reduction_text, warnings_text};
 use crate::report_html::{file_settings, page_of_logs, shell_line};
 use crate::result::IdentificationResult;
+use crate::simulated_log::{SimulateArgs, run_simulate};
 use crate::structure::{KeepOrder, Structure};
 use crate::{crs_a460, plots, puma};
 use clap::{Args, Subcommand, ValueEnum};
@@ -25,6 +26,8 @@ pub enum Command {
     Identify(IdentifyArgs),
     /// Show which parameters of a robot the motors can feel at all.
     Reduce(ReduceArgs),
+    /// Write the log that a robot with known inertia would leave behind.
+    Simulate(SimulateArgs),
 }
 
 /// A paper idim reproduces.
@@ -120,6 +123,7 @@ pub fn run(command: &Command, out: &mut dyn Write) -> Result<(), Error> {
     match command {
         Command::Identify(args) => run_identify(args, out),
         Command::Reduce(args) => run_reduce(args, out),
+        Command::Simulate(args) => run_simulate(args, out),
     }
 }
 

@@ -22,6 +22,7 @@ pub mod report_html;
 mod result;
 mod samples;
 pub mod simulate;
+mod simulated_log;
 mod structure;
 mod table;
 mod transmission;
