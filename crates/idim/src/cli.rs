@@ -1,5 +1,6 @@
 //! The command line, shared by the binary and the workspace's driver.
 
+use crate::check::{CheckArgs, Waiver, run_check};
 use crate::error::Error;
 use crate::identify::{IdentifyOptions, identify};
 use crate::load::{Changes, LoadedRobot, load_robot};
@@ -24,6 +25,8 @@ use std::process::ExitCode;
 pub enum Command {
     /// Identify a robot from its logs, or reproduce the papers.
     Identify(IdentifyArgs),
+    /// Examine logs before anything is computed from them: what is wrong, where, and what to do.
+    Check(CheckArgs),
     /// Show which parameters of a robot the motors can feel at all.
     Reduce(ReduceArgs),
     /// Write the log that a robot with known inertia would leave behind.
@@ -72,15 +75,18 @@ pub struct IdentifyArgs {
     /// Robot file, .ron or .urdf.
     #[arg(long, value_name = "FILE", requires = "log")]
     pub robot: Option<PathBuf>,
-    /// Log to learn from, FILE, FILE+FILE (columns side by side), either with @A..B (samples); may be repeated.
+    /// Log to learn from (CSV, Parquet, npz, rosbag2): FILE, FILE+FILE (columns side by side), either with @A..B (samples); may be repeated.
     #[arg(long, value_name = "LOG", num_args = 1.., requires = "robot", value_parser = LogSpec::parse)]
     pub log: Vec<LogSpec>,
     /// Log to validate on, named as --log (default: the last 30 % of each log).
     #[arg(long, value_name = "LOG", num_args = 1.., requires = "log", value_parser = LogSpec::parse)]
     pub validate: Vec<LogSpec>,
-    /// Which column holds what, where the header does not say so (RON).
-    #[arg(long, value_name = "FILE", requires = "log")]
+    /// Which column holds what, where the header does not say so (docs/logs.md).
+    #[arg(long, alias = "map", value_name = "FILE", requires = "log")]
     pub mapping: Option<PathBuf>,
+    /// Accept a finding of the log doctor by name, of all joints or of one; may be repeated.
+    #[arg(long, value_name = "CODE[:JOINT]")]
+    pub waive: Vec<Waiver>,
     /// Folder for results: DIR/ROBOT/result.json and plots.
     #[arg(long, value_name = "DIR", default_value = "idim-out")]
     pub out: PathBuf,
@@ -122,6 +128,7 @@ pub struct ReduceArgs {
 pub fn run(command: &Command, out: &mut dyn Write) -> Result<(), Error> {
     match command {
         Command::Identify(args) => run_identify(args, out),
+        Command::Check(args) => run_check(args, out),
         Command::Reduce(args) => run_reduce(args, out),
         Command::Simulate(args) => run_simulate(args, out),
     }
@@ -170,23 +177,32 @@ fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<()
         ));
     }
     let mapping = read_mapping(args.mapping.as_ref())?;
-    let training = read_logs(&args.log, &loaded, &mapping)?;
-    let validation = read_logs(&args.validate, &loaded, &mapping)?;
+    let training = read_logs(&args.log, &loaded, &mapping, &args.waive)?;
+    let validation = read_logs(&args.validate, &loaded, &mapping, &args.waive)?;
     let options = IdentifyOptions {
         columns: drive_columns(args.columns.as_deref()),
         as_recorded: args.as_recorded,
         seed: args.seed,
     };
     progress.stage("identifying");
-    let mut notes = training.notes;
-    notes.extend(validation.notes);
     let mut identification = identify(
         &loaded,
         training.measurements,
         validation.measurements,
         &options,
     )?;
-    identification.result.warnings.extend(notes);
+    for (inferred, findings) in [
+        (training.inferred, training.findings),
+        (validation.inferred, validation.findings),
+    ] {
+        let result = &mut identification.result;
+        let doubts = findings.iter().filter(|f| f.is_doubt());
+        result
+            .warnings
+            .extend(doubts.map(|f| f.finding.to_string()));
+        result.inferred.extend(inferred);
+        result.findings.extend(findings);
+    }
     progress.stage("drawing");
     let plots = plots::of_predictions(&identification.predictions, &loaded.robot);
     let settings = file_settings(robot, &args.log, &args.validate);
@@ -216,7 +232,7 @@ fn run_reduce(args: &ReduceArgs, out: &mut dyn Write) -> Result<(), Error> {
     structure.decided().map(|_| ())
 }
 
-fn load(robot: &Path, changes: &RobotChanges) -> Result<LoadedRobot, Error> {
+pub(crate) fn load(robot: &Path, changes: &RobotChanges) -> Result<LoadedRobot, Error> {
     load_robot(
         robot,
         &Changes {
@@ -280,7 +296,7 @@ pub(crate) fn file_name(name: &str) -> String {
     }
 }
 
-fn say(out: &mut dyn Write, text: &str) -> Result<(), Error> {
+pub(crate) fn say(out: &mut dyn Write, text: &str) -> Result<(), Error> {
     out.write_all(text.as_bytes())
         .map_err(|source| Error::Write {
             path: "standard output".into(),

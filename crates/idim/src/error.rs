@@ -53,6 +53,17 @@ pub enum Error {
         /// Which ranks, and which combination is in doubt.
         message: String,
     },
+    /// The doctor found what would spoil the result.
+    #[error(
+        "{text}{count} finding{} would spoil the result; correct the log, or waive by name what you know to be right: --waive CODE[:JOINT]",
+        if *count == 1 { "" } else { "s" }
+    )]
+    Findings {
+        /// How many.
+        count: usize,
+        /// One line each; empty where they have been shown already.
+        text: String,
+    },
     /// A rule of the command line or of a file that only this crate knows.
     #[error("{place}: {met}; {rule}")]
     Input {

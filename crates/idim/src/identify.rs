@@ -134,6 +134,8 @@ pub fn identify(
         validation: errors(&joints, &predictions, false),
         excitation: None,
         paper: Vec::new(),
+        inferred: Vec::new(),
+        findings: Vec::new(),
         conditioning: plan.choices.clone(),
         warnings,
     };

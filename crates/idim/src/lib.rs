@@ -2,6 +2,7 @@
 //!
 //! The pipeline (`identify`), the reproductions of two papers (`puma`, `crs_a460`), the command line and the report.
 
+pub mod check;
 pub mod cli;
 pub mod crs_a460;
 mod design;

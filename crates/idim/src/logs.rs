@@ -1,12 +1,13 @@
 //! Logs from files, checked before anything is computed.
 
+use crate::check::{CheckedFinding, Waiver, diagnose, gate, marked};
 use crate::error::Error;
 use crate::load::{LoadedRobot, read_text};
 use crate::log_spec::LogSpec;
 use crate::transmission::joint_side;
 use idim_measurement::formats::read_log;
 use idim_measurement::{
-    ColumnMapping, JointLabel, Log, Measurements, check_log, joint_labels, read_csv_files,
+    ColumnMapping, JointLabel, Log, Measurements, infer_time_unit, joint_labels, read_csv_files,
 };
 use std::path::{Path, PathBuf};
 
@@ -14,7 +15,10 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Logs {
     pub(crate) measurements: Vec<Measurements>,
-    pub(crate) notes: Vec<String>,
+    /// How the files were read and what was inferred, for the result's `inferred`.
+    pub(crate) inferred: Vec<String>,
+    /// What the doctor found; nothing that would spoil a result and is not waived.
+    pub(crate) findings: Vec<CheckedFinding>,
 }
 
 /// Fewer samples of every joint than this cannot tell a dozen parameters a joint from noise.
@@ -25,30 +29,52 @@ pub(crate) fn read_logs(
     specs: &[LogSpec],
     loaded: &LoadedRobot,
     mapping: &ColumnMapping,
+    waivers: &[Waiver],
 ) -> Result<Logs, Error> {
-    let labels = joint_labels(&loaded.robot, &loaded.described);
     let mut logs = Logs::default();
+    let mut read = Vec::new();
     for spec in specs {
-        let log = read(spec, &labels, mapping)?;
-        let log = joint_side(log, &loaded.robot)?;
-        let name = spec.name();
-        if log.n_samples() < FEWEST_SAMPLES {
-            return Err(Error::input(
-                name,
-                format!("{} samples", log.n_samples()),
-                format!("identification needs at least {FEWEST_SAMPLES}; record a longer motion"),
-            ));
-        }
-        let warnings = check_log(&log, &loaded.robot)?;
-        let said = log.notes.iter().chain(&warnings);
-        logs.notes.extend(said.map(|n| format!("{name}: {n}")));
-        let measured = Measurements::from_log(&log, &loaded.robot)?;
-        logs.measurements.push(match &spec.samples {
-            None => measured,
-            Some(range) => measured.slice(within(range, &measured, &name)?),
-        });
+        let log = read_log_spec(spec, loaded, mapping)?;
+        let notes = log.notes.iter();
+        logs.inferred
+            .extend(notes.map(|n| format!("{}: {n}", spec.name())));
+        read.push(log);
+    }
+    let findings = diagnose(&read, &loaded.robot).into_iter().flatten();
+    logs.findings = marked(findings.collect(), waivers);
+    gate(&logs.findings)?;
+    for log in &read {
+        logs.measurements
+            .push(Measurements::from_log(log, &loaded.robot)?);
     }
     Ok(logs)
+}
+
+/// One log as the command line names it: on the joint side, its clock settled, cut to the samples wanted.
+///
+/// # Errors
+/// What cannot be read, with place, value, rule and next step.
+pub(crate) fn read_log_spec(
+    spec: &LogSpec,
+    loaded: &LoadedRobot,
+    mapping: &ColumnMapping,
+) -> Result<Log, Error> {
+    let labels = joint_labels(&loaded.robot, &loaded.described);
+    let log = read(spec, &labels, mapping)?;
+    let mut log = joint_side(log, &loaded.robot)?;
+    let name = spec.name();
+    if log.n_samples() < FEWEST_SAMPLES {
+        return Err(Error::input(
+            name,
+            format!("{} samples", log.n_samples()),
+            format!("identification needs at least {FEWEST_SAMPLES}; record a longer motion"),
+        ));
+    }
+    infer_time_unit(&mut log);
+    Ok(match &spec.samples {
+        None => log,
+        Some(range) => log.slice(within(range, log.n_samples(), &name)?),
+    })
 }
 
 fn read(spec: &LogSpec, labels: &[JointLabel], mapping: &ColumnMapping) -> Result<Log, Error> {
@@ -95,10 +121,9 @@ fn file_name(path: &Path) -> String {
 
 fn within(
     range: &std::ops::Range<usize>,
-    measured: &Measurements,
+    n: usize,
     name: &str,
 ) -> Result<std::ops::Range<usize>, Error> {
-    let n = measured.n_samples();
     let wanted = range.start..if range.end == usize::MAX {
         n
     } else {
@@ -125,7 +150,7 @@ pub(crate) fn read_mapping(path: Option<&PathBuf>) -> Result<ColumnMapping, Erro
         Error::input(
             path.display().to_string(),
             e.to_string(),
-            "a mapping is (sample_rate: Hz, columns: [(header: \"..\", quantity: .., joint: \"..\", unit: \"..\"), ..])",
+            "a mapping is (sample_rate: Hz, columns: [(header: \"..\", quantity: .., joint: \"..\", unit: \"..\"), ..]), see docs/logs.md",
         )
     })
 }

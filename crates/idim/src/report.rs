@@ -37,7 +37,7 @@ pub fn identification_text(identification: &Identification) -> String {
     let mut out = reduction_text(&r.robot, &r.reduction);
     if !r.conditioning.is_empty() {
         out += "\nData\n";
-        for choice in &r.conditioning {
+        for choice in r.inferred.iter().chain(&r.conditioning) {
             let _ = writeln!(out, "  {choice}");
         }
     }

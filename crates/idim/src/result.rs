@@ -2,6 +2,7 @@
 //!
 //! docs/result.md defines every number.
 
+use crate::check::CheckedFinding;
 use serde::Serialize;
 
 /// Name of the schema.
@@ -35,6 +36,12 @@ pub struct IdentificationResult {
     /// Ours beside the printed numbers.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub paper: Vec<PaperNumber>,
+    /// How the files were read and which units were assumed or inferred, one sentence each.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub inferred: Vec<String>,
+    /// What the log doctor found, log by log.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<CheckedFinding>,
     /// How the log became samples, one sentence a choice.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub conditioning: Vec<String>,

@@ -7,12 +7,21 @@ pub(crate) fn table<const N: usize>(
     header: [&str; N],
     rows: impl IntoIterator<Item = [String; N]>,
 ) -> String {
+    aligned(header, rows, 1..N)
+}
+
+/// An aligned table with the columns of `right` to the right, the others to the left.
+pub(crate) fn aligned<const N: usize>(
+    header: [&str; N],
+    rows: impl IntoIterator<Item = [String; N]>,
+    right: impl IntoIterator<Item = usize>,
+) -> String {
     let mut table = Table::new();
     table.load_preset(presets::NOTHING).set_header(header);
     for row in rows {
         table.add_row(row);
     }
-    for k in 1..N {
+    for k in right {
         if let Some(column) = table.column_mut(k) {
             column.set_cell_alignment(CellAlignment::Right);
         }

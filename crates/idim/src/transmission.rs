@@ -30,7 +30,9 @@ pub(crate) fn joint_side(mut log: Log, robot: &Robot) -> Result<Log, Error> {
         };
         log.q = mixed(&inverse, &log.q);
         for (q, zero) in log.q.iter_mut().zip(robot.motor_zeros()) {
-            q.iter_mut().for_each(|v| *v += zero);
+            for v in q.iter_mut() {
+                *v += zero;
+            }
         }
         log.qd = log.qd.map(|qd| mixed(&inverse, &qd));
         log.qdd = log.qdd.map(|qdd| mixed(&inverse, &qdd));

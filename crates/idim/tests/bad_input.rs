@@ -169,12 +169,17 @@ fn regress_too_few_samples_say_how_many_are_needed() {
 }
 
 #[test]
-fn regress_milliseconds_without_a_unit_are_suspected() {
+fn regress_milliseconds_without_a_unit_are_inferred_where_velocities_confirm_them() {
     let mut lines = good();
     for l in &mut lines {
         l[0] *= 1000.0;
     }
-    Bench::new().refused(&csv(HEADER, &lines), &["t_ms"]);
+    let text = Bench::new()
+        .identify(&csv(HEADER, &lines), &["--as-recorded"])
+        .unwrap();
+    assert!(text.contains("time unit inferred: ms"), "{text}");
+    let unknown = HEADER.replace("qd", "speed");
+    Bench::new().refused(&csv(&unknown, &lines), &["t_ms"]);
 }
 
 #[test]

@@ -1,9 +1,10 @@
 //! A log from named columns of numbers, whatever file they came from.
 
 use crate::error::{Error, Place};
-use crate::header::{ColumnMapping, JointLabel};
+use crate::header::JointLabel;
 use crate::layout::find_layout;
 use crate::log::{Log, Parts, assemble, objection};
+use crate::mapping::ColumnMapping;
 use crate::quantity::Quantity;
 
 /// A named column of a recording.

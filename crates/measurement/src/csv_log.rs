@@ -2,9 +2,10 @@
 
 use crate::dialect::{Dialect, decode, find_dialect, find_head};
 use crate::error::{Error, Place, printable};
-use crate::header::{ColumnMapping, JointLabel};
+use crate::header::JointLabel;
 use crate::layout::{Layout, Source, find_layout};
 use crate::log::{Log, Parts, assemble, objection};
+use crate::mapping::ColumnMapping;
 use crate::quantity::Quantity;
 
 /// Reads a log from the bytes of a CSV file.

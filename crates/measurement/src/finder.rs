@@ -1,8 +1,9 @@
 //! Looking up columns, and saying what is missing, doubled or in an unknown unit.
 
 use crate::error::{Error, Place, closest, printable};
-use crate::header::{ColumnMapping, JointLabel, Meaning, list, mapped, meaning};
+use crate::header::{JointLabel, Meaning, list, meaning};
 use crate::layout::Source;
+use crate::mapping::{ColumnMapping, mapped};
 use crate::quantity::Quantity;
 use idim_model::JointKind;
 use std::collections::BTreeMap;

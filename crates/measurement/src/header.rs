@@ -1,9 +1,8 @@
 //! From header names to quantities of joints.
 
-use crate::error::{Error, Place, closest, printable};
+use crate::error::printable;
 use crate::quantity::Quantity;
 use idim_model::{JointKind, Robot};
-use serde::Deserialize;
 
 /// A joint as its columns may name it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -31,32 +30,6 @@ pub fn joint_labels(robot: &Robot, described: &Robot) -> Vec<JointLabel> {
             held: robot.joint_index(&joint.name).is_none(),
         })
         .collect()
-}
-
-/// Says by name which column holds what, where the header does not.
-#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ColumnMapping {
-    /// Columns that are not named as idim understands them.
-    pub columns: Vec<MappedColumn>,
-    /// Samples a second, Hz, for a log without a time column.
-    pub sample_rate: Option<f64>,
-}
-
-/// One column of a [`ColumnMapping`].
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MappedColumn {
-    /// Header of the column, exactly.
-    pub header: String,
-    /// What it holds: `t`, `q`, `qd`, `qdd`, `tau` or `current`.
-    pub quantity: Quantity,
-    /// Name or number of the joint; left out for time.
-    #[serde(default)]
-    pub joint: Option<String>,
-    /// Unit, `deg`; SI where left out.
-    #[serde(default)]
-    pub unit: Option<String>,
 }
 
 /// What a header means.
@@ -149,7 +122,7 @@ fn named_joint<'a>(rest: &'a str, joints: &[JointLabel]) -> Option<(usize, &'a s
     })
 }
 
-fn with_unit(quantity: Quantity, joint: usize, kind: JointKind, unit: &str) -> Meaning {
+pub(crate) fn with_unit(quantity: Quantity, joint: usize, kind: JointKind, unit: &str) -> Meaning {
     let factor = if unit.is_empty() {
         Some(1.0)
     } else {
@@ -168,66 +141,6 @@ fn with_unit(quantity: Quantity, joint: usize, kind: JointKind, unit: &str) -> M
             unit: unit.to_string(),
         },
     }
-}
-
-/// The meanings of a mapping's columns: position in the header and meaning.
-pub(crate) fn mapped(
-    mapping: &ColumnMapping,
-    headers: &[String],
-    joints: &[JointLabel],
-    file: &str,
-) -> Result<Vec<(usize, Meaning)>, Error> {
-    mapping
-        .columns
-        .iter()
-        .map(|column| {
-            let refuse = |met: String, rule: String| {
-                let place = Place::file(file).column(&column.header);
-                Error::log("mapping", place, met, rule)
-            };
-            let here: Vec<usize> = (0..headers.len())
-                .filter(|&i| headers[i].trim() == column.header.trim())
-                .collect();
-            let &[at] = here.as_slice() else {
-                let near = closest(&column.header, headers.iter().map(String::as_str));
-                return Err(refuse(
-                    format!("mapped, but {} columns have this header", here.len()),
-                    format!(
-                        "a mapping names one column of the file; {}",
-                        list("the closest are", &near, "correct the mapping")
-                    ),
-                ));
-            };
-            let joint = match (&column.joint, column.quantity) {
-                (_, Quantity::Time) => 0,
-                (Some(name), _) => joints
-                    .iter()
-                    .position(|j| j.name == *name || j.number.to_string() == *name)
-                    .ok_or_else(|| {
-                        let near = closest(name, joints.iter().map(|j| j.name.as_str()));
-                        refuse(
-                            format!("mapped to joint `{}`", printable(name)),
-                            format!(
-                                "the robot has no such joint; {}",
-                                list("the closest are", &near, "give its name or number")
-                            ),
-                        )
-                    })?,
-                (None, _) => {
-                    return Err(refuse(
-                        format!("mapped to {} of no joint", column.quantity.symbol()),
-                        "give the joint's name or number in the mapping".to_string(),
-                    ));
-                }
-            };
-            let kind = match column.quantity {
-                Quantity::Time => JointKind::Revolute,
-                _ => joints[joint].kind,
-            };
-            let unit = column.unit.as_deref().unwrap_or("");
-            Ok((at, with_unit(column.quantity, joint, kind, unit)))
-        })
-        .collect()
 }
 
 /// `words a, b` or, where there is nothing to list, `otherwise`.

@@ -3,8 +3,9 @@
 use crate::csv_log::read_csv;
 use crate::dialect::{decode, find_head, separator};
 use crate::error::{Error, Place};
-use crate::header::{ColumnMapping, JointLabel};
+use crate::header::JointLabel;
 use crate::log::Log;
+use crate::mapping::ColumnMapping;
 
 /// Reads a recording whose columns are spread over several CSV files with the same number of lines.
 ///

@@ -2,7 +2,8 @@
 
 use crate::error::{Error, Place};
 use crate::finder::Finder;
-use crate::header::{ColumnMapping, JointLabel, Meaning, list, meaning};
+use crate::header::{JointLabel, Meaning, list, meaning};
+use crate::mapping::ColumnMapping;
 use crate::quantity::Quantity;
 use idim_model::JointKind;
 

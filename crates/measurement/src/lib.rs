@@ -50,6 +50,7 @@ mod header;
 mod join;
 mod layout;
 mod log;
+mod mapping;
 mod measurements;
 mod motion;
 mod period;
@@ -67,13 +68,15 @@ pub use differentiate::{first_difference, second_difference};
 pub use error::{Error, Place};
 pub use filter::{Section, butterworth, chebyshev, filter_zero_phase, padding, settling};
 pub use harmonics::{Harmonics, fit_harmonics};
-pub use header::{ColumnMapping, JointLabel, MappedColumn, joint_labels};
+pub use header::{JointLabel, joint_labels};
 pub use join::read_csv_files;
 pub use log::{Drive, Log};
+pub use mapping::{ColumnMapping, MappedColumn};
 pub use measurements::Measurements;
 pub use motion::{JointMotion, check_motion, joint_motion};
 pub use period::{Period, PeriodAverage, REPEATS, average_periods, find_period};
 pub use plausibility::{
-    VelocityFit, check_clock_unit, check_log, check_positions, check_velocity, velocity_fit,
+    VelocityFit, check_clock_unit, check_log, check_positions, check_velocity, infer_time_unit,
+    velocity_fit,
 };
 pub use quantity::Quantity;

@@ -1,8 +1,9 @@
 //! A log: what a recording says, in SI units.
 
 use crate::error::{Error, Place};
-use crate::header::{ColumnMapping, JointLabel};
+use crate::header::JointLabel;
 use crate::layout::Layout;
+use crate::mapping::ColumnMapping;
 use crate::quantity::Quantity;
 
 /// What drove the joints, joint by joint.
@@ -48,6 +49,34 @@ impl Log {
     /// Number of joints.
     pub fn n_joints(&self) -> usize {
         self.q.len()
+    }
+
+    /// The samples of a range.
+    ///
+    /// # Panics
+    /// If the range is not within the samples.
+    #[must_use]
+    #[track_caller]
+    pub fn slice(&self, samples: std::ops::Range<usize>) -> Self {
+        let cut = |x: &[Vec<f64>]| -> Vec<Vec<f64>> {
+            x.iter().map(|c| c[samples.clone()].to_vec()).collect()
+        };
+        let lines = self.lines.get(samples.clone());
+        Self {
+            file: self.file.clone(),
+            joints: self.joints.clone(),
+            time_unit_declared: self.time_unit_declared,
+            time: self.time[samples.clone()].to_vec(),
+            q: cut(&self.q),
+            qd: self.qd.as_deref().map(cut),
+            qdd: self.qdd.as_deref().map(cut),
+            drive: match &self.drive {
+                Drive::Torque(x) => Drive::Torque(cut(x)),
+                Drive::Current(x) => Drive::Current(cut(x)),
+            },
+            notes: self.notes.clone(),
+            lines: lines.map(<[u64]>::to_vec).unwrap_or_default(),
+        }
     }
 
     /// Where a sample stands.

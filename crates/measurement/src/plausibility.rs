@@ -52,6 +52,45 @@ pub fn check_clock_unit(log: &Log) -> Result<(), Error> {
     ))
 }
 
+/// Deviation of a velocity's factor from a power of ten that is one unit of time for another.
+const UNIT_TOLERANCE: f64 = 0.1;
+
+/// Settles a clock without a unit that cannot be seconds where recorded velocities say what it is: `∫q̇ dt` is then
+/// a power of ten off the change of `q` in every joint that moves. The note says what was inferred and why.
+///
+/// Anything else stays as it is, for [`check_clock_unit`] to refuse.
+pub fn infer_time_unit(log: &mut Log) {
+    let dt = median_interval(&log.time);
+    let [low, high] = PLAUSIBLE_INTERVAL;
+    if log.time_unit_declared || (low..=high).contains(&dt) {
+        return;
+    }
+    let Some(qd) = &log.qd else { return };
+    for (unit, seconds) in [("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)] {
+        if !(low..=high).contains(&(dt * seconds)) {
+            continue;
+        }
+        let time: Vec<f64> = log.time.iter().map(|t| t * seconds).collect();
+        let fits = log.q.iter().zip(qd);
+        let fits: Vec<VelocityFit> = fits
+            .filter_map(|(q, v)| velocity_fit(&time, q, v))
+            .collect();
+        let agree = |f: &VelocityFit| {
+            f.correlation > SAME_MOTION && (f.factor - 1.0).abs() < UNIT_TOLERANCE
+        };
+        if !fits.is_empty() && fits.iter().all(agree) {
+            log.time = time;
+            log.time_unit_declared = true;
+            log.notes.push(format!(
+                "time unit inferred: {unit}, because dq/dt then agrees with the recorded qd in all {} moving joints (dt = {} s)",
+                fits.len(),
+                dt * seconds
+            ));
+            return;
+        }
+    }
+}
+
 /// Median of the intervals between samples, s.
 pub(crate) fn median_interval(time: &[f64]) -> f64 {
     let mut steps: Vec<f64> = time.windows(2).map(|w| w[1] - w[0]).collect();

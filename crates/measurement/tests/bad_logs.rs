@@ -396,8 +396,9 @@ fn a_mapping_that_does_not_fit_is_refused() {
             quantity: Quantity::Position,
             joint: joint.map(str::to_string),
             unit: unit.map(str::to_string),
+            factor: None,
         }],
-        sample_rate: None,
+        ..ColumnMapping::default()
     };
     let read = |mapping| read_csv(good(20).as_bytes(), "run.csv", &labels(&two()), &mapping);
     let cases = [

@@ -12,6 +12,7 @@ fn column(header: &str, quantity: Quantity, joint: usize) -> MappedColumn {
         quantity,
         joint: Some(joint.to_string()),
         unit: None,
+        factor: None,
     }
 }
 

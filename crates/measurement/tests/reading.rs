@@ -121,6 +121,7 @@ fn a_mapping_names_foreign_columns() {
         quantity,
         joint: joint.map(str::to_string),
         unit: unit.map(str::to_string),
+        factor: None,
     };
     let mapping = ColumnMapping {
         columns: vec![
@@ -130,7 +131,7 @@ fn a_mapping_names_foreign_columns() {
             column("effort_0", Quantity::Torque, Some("shoulder"), None),
             column("effort_1", Quantity::Torque, Some("2"), None),
         ],
-        sample_rate: None,
+        ..ColumnMapping::default()
     };
     let log = read_csv(text.as_bytes(), "run.csv", &labels(&two()), &mapping).unwrap();
     assert!((log.time[2] - 2e-3).abs() < 1e-15);
@@ -147,8 +148,9 @@ fn a_mapping_goes_before_names() {
             quantity: Quantity::Position,
             joint: Some("1".into()),
             unit: None,
+            factor: None,
         }],
-        sample_rate: None,
+        ..ColumnMapping::default()
     };
     let log = read_csv(good(20).as_bytes(), "run.csv", &labels(&two()), &mapping).unwrap();
     assert_eq!(log.q[0][0], 1.0);

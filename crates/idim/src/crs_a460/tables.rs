@@ -208,6 +208,8 @@ pub(super) fn result(
         validation: None,
         excitation: Some(motions.iter().map(motion_json).collect()),
         paper,
+        inferred: Vec::new(),
+        findings: Vec::new(),
         conditioning: Vec::new(),
         warnings: vec![
             "The inertial and friction values of the simulated arm are invented; table II of the paper is not realisable and serves as print only.".into(),

@@ -224,6 +224,8 @@ pub(super) fn result(found: &Found, seed: u64) -> IdentificationResult {
         validation: None,
         excitation: Some(excitation_json(found.motion)),
         paper: paper_numbers(found),
+        inferred: Vec::new(),
+        findings: Vec::new(),
         conditioning: Vec::new(),
         warnings: vec![
             "The paper gives no limits; those used here are inferred from its table 2.".into(),

@@ -2,8 +2,9 @@
 
 use crate::columns::{NamedColumn, log_from_columns};
 use crate::error::{Error, Place, printable};
-use crate::header::{ColumnMapping, JointLabel};
+use crate::header::JointLabel;
 use crate::log::Log;
+use crate::mapping::ColumnMapping;
 
 /// One message.
 #[derive(Debug, Clone, PartialEq, Default)]

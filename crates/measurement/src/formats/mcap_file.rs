@@ -2,8 +2,9 @@
 
 use super::joint_state::{Collector, damaged, decode_joint_state, one_topic};
 use crate::error::Error;
-use crate::header::{ColumnMapping, JointLabel};
+use crate::header::JointLabel;
 use crate::log::Log;
+use crate::mapping::ColumnMapping;
 use mcap::MessageStream;
 
 /// Reads the JointState messages of an MCAP file, in the order they were received.

@@ -24,8 +24,9 @@ pub use rosbag2::read_rosbag2;
 
 use crate::csv_log::read_csv;
 use crate::error::{Error, Place, printable};
-use crate::header::{ColumnMapping, JointLabel};
+use crate::header::JointLabel;
 use crate::log::Log;
+use crate::mapping::ColumnMapping;
 use std::path::{Path, PathBuf};
 
 /// Reads a log of any format, told by the file's ending: `csv`, `tsv`, `txt`, `dat`, and with their features `parquet`,
@@ -40,7 +41,7 @@ pub fn read_log(path: &Path, joints: &[JointLabel], mapping: &ColumnMapping) -> 
         .extension()
         .map_or(String::new(), |e| e.to_string_lossy().to_lowercase());
     match ending.as_str() {
-        "csv" | "tsv" | "txt" | "dat" => read_csv(&bytes(path)?, &file, joints, mapping),
+        csv if CSV.contains(&csv) => read_csv(&bytes(path)?, &file, joints, mapping),
         #[cfg(feature = "rosbag2")]
         "db3" => read_rosbag2(path, joints, mapping),
         #[cfg(feature = "mcap")]
@@ -65,6 +66,9 @@ pub fn read_log(path: &Path, joints: &[JointLabel], mapping: &ColumnMapping) -> 
         )),
     }
 }
+
+/// Endings of text with columns.
+const CSV: [&str; 4] = ["csv", "tsv", "txt", "dat"];
 
 #[cfg(not(all(
     feature = "rosbag2",

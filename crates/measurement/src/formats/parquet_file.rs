@@ -2,8 +2,9 @@
 
 use crate::columns::{NamedColumn, log_from_columns};
 use crate::error::{Error, Place};
-use crate::header::{ColumnMapping, JointLabel};
+use crate::header::JointLabel;
 use crate::log::Log;
+use crate::mapping::ColumnMapping;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 

@@ -3,8 +3,9 @@
 use super::file_name;
 use super::joint_state::{Collector, damaged, decode_joint_state, one_topic};
 use crate::error::Error;
-use crate::header::{ColumnMapping, JointLabel};
+use crate::header::JointLabel;
 use crate::log::Log;
+use crate::mapping::ColumnMapping;
 use rusqlite::{Connection, OpenFlags};
 use std::path::Path;
 

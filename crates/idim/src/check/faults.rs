@@ -1,0 +1,160 @@
+//! Faults a rigid body betrays, in words.
+
+use idim_measurement::Place;
+use idim_measurement::doctor::{Finding, Severity};
+use idim_model::Robot;
+use nalgebra::Vector3;
+
+/// What is wrong with the columns of a log, or with the robot it is said to be of.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Fault {
+    TorqueSign(usize),
+    PositionSign(usize),
+    /// Both signs: the axis points the other way.
+    Axis(usize),
+    TorqueOrder(usize, usize),
+    PositionOrder(usize, usize),
+    /// Both columns of two joints.
+    Relabelled(usize, usize),
+    /// `recorded`: recorded torque per true torque; of all joints where `joint` is `None`.
+    TorqueFactor {
+        joint: Option<usize>,
+        recorded: f64,
+        code: &'static str,
+        meaning: &'static str,
+    },
+    /// The same of positions.
+    PositionFactor {
+        joint: Option<usize>,
+        recorded: f64,
+        code: &'static str,
+        meaning: &'static str,
+    },
+    Gravity(Vector3<f64>),
+}
+
+/// Rule of everything the rigid body betrays.
+const RULE: &str = "the joints share masses and inertias, so their torques must agree about them";
+
+impl Fault {
+    /// A torque to be multiplied by a factor that has no name.
+    pub(crate) fn plain_torque_factor(joint: usize, factor: f64) -> Self {
+        Self::TorqueFactor {
+            joint: Some(joint),
+            recorded: 1.0 / factor,
+            code: "torque-scale",
+            meaning: "no unit or gear ratio of the robot file: is it a current, in percent, or on the motor side?",
+        }
+    }
+
+    /// Simple faults go before contrived ones that explain a log as well.
+    pub(crate) fn complexity(&self) -> usize {
+        match self {
+            Self::TorqueSign(_)
+            | Self::PositionSign(_)
+            | Self::TorqueOrder(..)
+            | Self::PositionOrder(..) => 0,
+            Self::TorqueFactor { code, .. } if *code == "torque-scale" => 2,
+            Self::TorqueFactor { .. } | Self::PositionFactor { .. } => 1,
+            Self::Axis(_) | Self::Relabelled(..) | Self::Gravity(_) => 3,
+        }
+    }
+
+    /// As findings, one a joint concerned. `gain`: fall of the joints' summed logarithmic errors.
+    pub(crate) fn findings(&self, robot: &Robot, file: &str, gain: f64) -> Vec<Finding> {
+        let name = |j: usize| robot.joints()[j].name.as_str();
+        let at = |j: usize| Place::file(file).joint(name(j));
+        let better = format!(
+            "the errors of all joints then shrink {:.1} times",
+            gain.exp()
+        );
+        let finding = |code, place, value: f64, met: String, next: String| Finding {
+            code,
+            severity: Severity::Error,
+            place,
+            value: value.is_finite().then_some(value),
+            met,
+            rule: RULE.into(),
+            next_step: next,
+        };
+        let factor = |what: &str, joint: Option<usize>, recorded, code, meaning: &str| {
+            let whose = joint.map_or_else(|| "all joints".to_owned(), |j| name(j).to_owned());
+            finding(
+                code,
+                joint.map_or_else(|| Place::file(file), at),
+                recorded,
+                format!(
+                    "{what} of {whose} is {recorded:.4e} times what the other joints say; {better}"
+                ),
+                format!("that is {meaning}; convert the column, or declare its unit"),
+            )
+        };
+        match *self {
+            Self::TorqueSign(j) => vec![finding(
+                "torque-sign",
+                at(j),
+                -1.0,
+                format!("the torque has the wrong sign; turned, {better}"),
+                "change the sign of this joint's torque".into(),
+            )],
+            Self::PositionSign(j) => vec![finding(
+                "position-sign",
+                at(j),
+                -1.0,
+                format!("the position has the wrong sign; turned, {better}"),
+                "change the sign of this joint's position and velocity".into(),
+            )],
+            Self::Axis(j) => vec![finding(
+                "joint-axis",
+                at(j),
+                -1.0,
+                format!("position and torque have the wrong sign; both turned, {better}"),
+                "turn the joint's axis in the robot file, or the sign of both columns".into(),
+            )],
+            Self::TorqueOrder(i, k) | Self::PositionOrder(i, k) | Self::Relabelled(i, k) => {
+                let columns = match self {
+                    Self::TorqueOrder(..) => "torques",
+                    Self::PositionOrder(..) => "positions",
+                    _ => "columns",
+                };
+                [(i, k), (k, i)]
+                    .map(|(j, other)| {
+                        finding(
+                            "joint-order",
+                            at(j),
+                            other as f64 + 1.0,
+                            format!(
+                                "the {columns} of {} and {} are exchanged; {better}",
+                                name(i),
+                                name(k)
+                            ),
+                            format!("this joint's {columns} are under {}", name(other)),
+                        )
+                    })
+                    .to_vec()
+            }
+            Self::TorqueFactor {
+                joint,
+                recorded,
+                code,
+                meaning,
+            } => vec![factor("the torque", joint, recorded, code, meaning)],
+            Self::PositionFactor {
+                joint,
+                recorded,
+                code,
+                meaning,
+            } => vec![factor("the position", joint, recorded, code, meaning)],
+            Self::Gravity(g) => vec![finding(
+                "gravity-direction",
+                Place::file(file),
+                f64::NAN,
+                format!(
+                    "gravity along ({:.2}, {:.2}, {:.2}) m/s² explains the torques better; {better}",
+                    g.x, g.y, g.z
+                ),
+                "state how the robot is mounted with --gravity or in the robot file".into(),
+            )],
+        }
+    }
+}
