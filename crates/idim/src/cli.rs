@@ -2,6 +2,7 @@
 
 use crate::check::{CheckArgs, Waiver, run_check};
 use crate::error::Error;
+use crate::export::exports;
 use crate::identify::{IdentifyOptions, identify};
 use crate::load::{Changes, LoadedRobot, load_robot};
 use crate::log_spec::LogSpec;
@@ -207,9 +208,12 @@ fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<()
     let plots = plots::of_predictions(&identification.predictions, &loaded.robot);
     let settings = file_settings(robot, &args.log, &args.validate);
     let page = page_of_logs(&identification, &loaded.robot, &command_line(), &settings);
+    progress.stage("writing the model for others");
+    let mut files = plots;
+    files.extend(exports(&identification, &loaded.robot));
     progress.finish();
     say(out, &identification_text(&identification))?;
-    write_results(&args.out, &identification.result, &plots, &page, out)
+    write_results(&args.out, &identification.result, &files, &page, out)
 }
 
 fn run_reduce(args: &ReduceArgs, out: &mut dyn Write) -> Result<(), Error> {
@@ -250,18 +254,18 @@ fn command_line() -> String {
     shell_line(std::iter::once("idim".to_owned()).chain(std::env::args().skip(1)))
 }
 
-/// Writes `DIR/ROBOT/result.json`, the plots and the report, and says where.
+/// Writes `DIR/ROBOT/result.json`, the report and what else there is, and says where.
 fn write_results(
     dir: &Path,
     result: &IdentificationResult,
-    plots: &[NamedText],
+    files: &[NamedText],
     page: &str,
     out: &mut dyn Write,
 ) -> Result<(), Error> {
     let folder = dir.join(file_name(&result.robot));
     let json = serde_json::to_string_pretty(result)
         .map_err(|e| Error::input("result", e.to_string(), "a defect of this program"))?;
-    for (name, text) in plots {
+    for (name, text) in files {
         write_atomically(&folder.join(name), text.as_bytes())?;
     }
     write_atomically(&folder.join("report.html"), page.as_bytes())?;
@@ -269,9 +273,9 @@ fn write_results(
     say(
         out,
         &format!(
-            "\nopen {}; result.json and {} plots lie beside it\n\n",
+            "\nopen {}; result.json and {} other files lie beside it\n\n",
             folder.join("report.html").display(),
-            plots.len()
+            files.len()
         ),
     )
 }

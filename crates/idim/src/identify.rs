@@ -7,9 +7,9 @@ use crate::result::{
     ConditionResult, ErrorResult, EstimateResult, IdentificationResult, JointError,
     ParameterResult, SCHEMA,
 };
-use crate::samples::{Rows, SamplingPlan, Stretch, predict, push_rows, stretches};
+use crate::samples::{Rows, SamplingPlan, Stretch, predict, push_rows, reversal_speeds, stretches};
 use crate::structure::{KeepOrder, Structure};
-use faer::MatRef;
+use faer::{Mat, MatRef};
 use idim_base_params::{ReductionOptions, TriangularFactor, reduce};
 use idim_estimation::{
     Estimate, ResidualStatistics, Solution, WeightedSolution, Weighting, WeightingOptions,
@@ -69,6 +69,16 @@ pub struct Identification {
     pub logs: Vec<LogSummary>,
     /// Singular values of the rows the estimate was made from.
     pub spectrum: Spectrum,
+    /// What the motors can feel.
+    pub structure: Structure,
+    /// The columns that have a value.
+    pub columns: Columns,
+    /// Their values, SI.
+    pub values: Vec<f64>,
+    /// Covariance of the values.
+    pub covariance: Mat<f64>,
+    /// Speed over which each joint's Coulomb torque changes sign, rad/s (m/s); 0 is the sign itself.
+    pub reversal: Vec<f64>,
 }
 
 /// Identifies a robot from its logs.
@@ -145,6 +155,11 @@ pub fn identify(
         predictions,
         logs,
         spectrum: fit.spectrum,
+        structure,
+        columns: fit.columns,
+        values: fit.values,
+        covariance: fit.covariance,
+        reversal: reversal_speeds(robot, plan.coulomb_speed),
     })
 }
 
@@ -178,6 +193,7 @@ fn all_stretches(logs: &[Measurements], plan: &SamplingPlan) -> Result<Vec<Stret
 struct Fit {
     columns: Columns,
     values: Vec<f64>,
+    covariance: Mat<f64>,
     result: EstimateResult,
     warnings: Vec<String>,
     spectrum: Spectrum,
@@ -190,6 +206,7 @@ impl Fit {
         Self {
             columns,
             values: solved.estimate.values.clone(),
+            covariance: solved.estimate.covariance.clone(),
             result: estimate_result(solved, names),
             warnings,
             spectrum: solved.spectrum.clone(),

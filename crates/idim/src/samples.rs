@@ -238,14 +238,7 @@ pub(crate) fn visit_rows(
                 .position(|p| p.kind == ParameterKind::Fc && p.index == j)
         })
         .collect();
-    let speed: Vec<f64> = robot
-        .joints()
-        .iter()
-        .map(|j| match j.kind {
-            JointKind::Revolute => coulomb_speed,
-            JointKind::Prismatic => coulomb_speed * PRISMATIC_SPEED,
-        })
-        .collect();
+    let speed = reversal_speeds(robot, coulomb_speed);
     let mut row = vec![0.0; columns.len()];
     visit_torque_regressor(&model, columns, states, |block| {
         for lane in 0..block.n_samples() {
@@ -259,6 +252,16 @@ pub(crate) fn visit_rows(
             }
         }
     });
+}
+
+/// Speed over which each joint's Coulomb torque changes sign, rad/s (m/s), from that of a revolute one.
+pub(crate) fn reversal_speeds(robot: &Robot, coulomb_speed: f64) -> Vec<f64> {
+    let joints = robot.joints().iter();
+    let speed = |kind| match kind {
+        JointKind::Revolute => coulomb_speed,
+        JointKind::Prismatic => coulomb_speed * PRISMATIC_SPEED,
+    };
+    joints.map(|j| speed(j.kind)).collect()
 }
 
 /// Predicted torque of every sample, joint by joint.

@@ -149,7 +149,7 @@ pub(super) fn position_unit(kind: JointKind) -> &'static str {
 }
 
 /// Unit of a parameter by its name (`ZZR1`, `mx2`, `Fv3`); empty for a word that is not known.
-pub(super) fn parameter_unit(name: &str, robot: &Robot) -> &'static str {
+pub(crate) fn parameter_unit(name: &str, robot: &Robot) -> &'static str {
     let word = name.trim_end_matches(|c: char| c.is_ascii_digit());
     let number: Option<usize> = name[word.len()..].parse().ok();
     let kind = number
