@@ -190,7 +190,9 @@ impl SimulatedLog {
         }
         if drives.positions == LogSide::Motor {
             for (q, zero) in position.iter_mut().zip(robot.motor_zeros()) {
-                q.iter_mut().for_each(|v| *v -= zero);
+                for v in q.iter_mut() {
+                    *v -= zero;
+                }
             }
             position = mixed(&robot.transmission()?, &position);
         }

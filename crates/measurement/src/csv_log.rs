@@ -1,6 +1,6 @@
 //! Reading a log from the text of a CSV file.
 
-use crate::dialect::{Dialect, decode, find_dialect, find_head};
+use crate::dialect::{Dialect, decode, find_dialect, find_head, without_hint};
 use crate::error::{Error, Place, printable};
 use crate::header::JointLabel;
 use crate::layout::{Layout, Source, find_layout};
@@ -24,6 +24,8 @@ pub fn read_csv(
     mapping: &ColumnMapping,
 ) -> Result<Log, Error> {
     let text = decode(bytes, file)?;
+    let text = without_hint(text);
+    let text = text.as_ref();
     let head = find_head(text, file)?;
     let dialect = find_dialect(text, &head, file)?;
     let mut reader = csv::ReaderBuilder::new()

@@ -1,6 +1,7 @@
 //! The dialect of a CSV file: separator, decimal mark, comments, encoding.
 
 use crate::error::{Error, Place, printable};
+use std::borrow::Cow;
 use std::fmt;
 
 /// How a CSV file separates its columns and writes its numbers.
@@ -35,11 +36,24 @@ const LINE_LIMIT: usize = 1 << 20;
 /// Data lines looked at to find the decimal mark.
 const SNIFFED_LINES: usize = 200;
 
-/// The text of a file without its byte order mark.
-pub(crate) fn decode<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, Error> {
+/// The text of a file without its byte order mark: UTF-8, or UTF-16 that says so by its mark.
+pub(crate) fn decode<'a>(bytes: &'a [u8], file: &str) -> Result<Cow<'a, str>, Error> {
     let refuse = |met: &str, rule: &str| Err(Error::log("encoding", Place::file(file), met, rule));
-    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
-        return refuse("UTF-16 text", "save the file as UTF-8");
+    for (mark, unit) in [
+        ([0xff, 0xfe], u16::from_le_bytes as fn([u8; 2]) -> u16),
+        ([0xfe, 0xff], u16::from_be_bytes),
+    ] {
+        if let Some(bytes) = bytes.strip_prefix(&mark) {
+            let (pairs, rest) = bytes.as_chunks::<2>();
+            let units: Vec<u16> = pairs.iter().map(|&p| unit(p)).collect();
+            return match String::from_utf16(&units) {
+                Ok(text) if rest.is_empty() => {
+                    check_lines(text.as_bytes(), file)?;
+                    Ok(Cow::Owned(text))
+                }
+                _ => refuse("damaged UTF-16 text", "save the file as UTF-8"),
+            };
+        }
     }
     if bytes.iter().take(4096).any(|&b| b == 0) {
         return refuse(
@@ -48,6 +62,32 @@ pub(crate) fn decode<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, Error> 
         );
     }
     let bytes = bytes.strip_prefix(&[0xef, 0xbb, 0xbf]).unwrap_or(bytes);
+    check_lines(bytes, file)?;
+    std::str::from_utf8(bytes).map(Cow::Borrowed).map_err(|e| {
+        let line = bytes[..e.valid_up_to()].split(|&b| b == b'\n').count() as u64;
+        Error::log(
+            "encoding",
+            Place::file(file).line(line),
+            "a byte that is not UTF-8",
+            "save the file as UTF-8",
+        )
+    })
+}
+
+/// The text with a spreadsheet's first line `sep=;` made a comment; the header says as much.
+pub(crate) fn without_hint(text: Cow<'_, str>) -> Cow<'_, str> {
+    let hint = text
+        .get(..4)
+        .is_some_and(|t| t.eq_ignore_ascii_case("sep="));
+    if hint {
+        Cow::Owned(format!("#{text}"))
+    } else {
+        text
+    }
+}
+
+/// No line is longer than a table's can be.
+fn check_lines(bytes: &[u8], file: &str) -> Result<(), Error> {
     for (n, line) in bytes.split(|&b| b == b'\n').enumerate() {
         if line.len() > LINE_LIMIT {
             return Err(Error::log(
@@ -58,15 +98,7 @@ pub(crate) fn decode<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, Error> 
             ));
         }
     }
-    std::str::from_utf8(bytes).map_err(|e| {
-        let line = bytes[..e.valid_up_to()].split(|&b| b == b'\n').count() as u64;
-        Error::log(
-            "encoding",
-            Place::file(file).line(line),
-            "a byte that is not UTF-8",
-            "save the file as UTF-8",
-        )
-    })
+    Ok(())
 }
 
 /// Header line and the lines before it that are comments.

@@ -1,7 +1,7 @@
 //! Several CSV files of one recording, side by side.
 
 use crate::csv_log::read_csv;
-use crate::dialect::{decode, find_head, separator};
+use crate::dialect::{decode, find_head, separator, without_hint};
 use crate::error::{Error, Place};
 use crate::header::JointLabel;
 use crate::log::Log;
@@ -22,9 +22,13 @@ pub fn read_csv_files(
     if let [(bytes, file)] = files {
         return read_csv(bytes, file, joints, mapping);
     }
-    let mut tables: Vec<Table<'_>> = Vec::new();
+    let mut texts = Vec::new();
     for (bytes, file) in files {
-        tables.push(Table::new(bytes, file)?);
+        texts.push(without_hint(decode(bytes, file)?));
+    }
+    let mut tables: Vec<Table<'_>> = Vec::new();
+    for (text, (_, file)) in texts.iter().zip(files) {
+        tables.push(Table::new(text, file)?);
     }
     let Some(first) = tables.first() else {
         let rule = "give at least one file";
@@ -73,8 +77,7 @@ struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    fn new(bytes: &'a [u8], file: &'a str) -> Result<Self, Error> {
-        let text = decode(bytes, file)?;
+    fn new(text: &'a str, file: &'a str) -> Result<Self, Error> {
         let head = find_head(text, file)?;
         let separator = separator(head.header);
         let mut lines = text

@@ -73,9 +73,23 @@ fn dialects_hold_the_same_numbers() {
         ("header as a comment", format!("# {text}")),
         ("quotes", quoted(&text)),
         ("blank end", format!("{text}\n\n")),
+        (
+            "a spreadsheet's hint",
+            format!("sep=;\n{}", text.replace(',', ";")),
+        ),
     ];
-    for (name, text) in cases {
-        let log = read(&text).unwrap_or_else(|e| panic!("{name}: {e}"));
+    let mut files: Vec<(&str, Vec<u8>)> = cases
+        .into_iter()
+        .map(|(name, text)| (name, text.into_bytes()))
+        .collect();
+    let units = || text.encode_utf16();
+    let little = [0xff, 0xfe].into_iter();
+    let little = little.chain(units().flat_map(u16::to_le_bytes)).collect();
+    let big = [0xfe, 0xff].into_iter();
+    let big = big.chain(units().flat_map(u16::to_be_bytes)).collect();
+    files.extend([("UTF-16", little), ("UTF-16, big end first", big)]);
+    for (name, bytes) in files {
+        let log = common::read_bytes(&bytes).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!(
             (&log.time, &log.q, &log.qd),
             (&plain.time, &plain.q, &plain.qd),

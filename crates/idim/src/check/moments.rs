@@ -151,37 +151,6 @@ impl Moments {
         }
     }
 
-    /// Errors of the joints relative to their spread in `other`, whose folds are predicted from the other folds of
-    /// `self`; channels are the joints' own.
-    pub(crate) fn predicting(&self, other: &Self) -> Vec<f64> {
-        let share = own_channels(self.n);
-        let all = self.total();
-        let mut weight: Vec<f64> = (0..self.n)
-            .map(|j| 1.0 / self.spread(&all, &share, j).max(f64::MIN_POSITIVE))
-            .collect();
-        for _ in 0..ROUNDS {
-            let values = self.solve(&all, &weight, &share, RIDGES[0]);
-            for j in 0..self.n {
-                let error = self.error(&all, &values, &share, j);
-                weight[j] = 1.0 / error.max(f64::MIN_POSITIVE);
-            }
-        }
-        let mut errors = vec![0.0; self.n];
-        for (fold, unseen) in self.folds.iter().zip(&other.folds) {
-            let values = self.solve(&all.without(fold), &weight, &share, RIDGES[0]);
-            for j in 0..self.n {
-                errors[j] += self.error(unseen, &values, &share, j);
-            }
-        }
-        let whole = other.total();
-        (0..self.n)
-            .map(|j| {
-                let spread = other.spread(&whole, &share, j).max(f64::MIN_POSITIVE);
-                (errors[j] / spread).sqrt()
-            })
-            .collect()
-    }
-
     fn total(&self) -> Fold {
         let mut all = self.folds[0].clone();
         for fold in &self.folds[1..] {
@@ -254,13 +223,6 @@ impl Moments {
         }
         error.max(0.0)
     }
-}
-
-/// Every joint's torque is the channel of its number.
-pub(crate) fn own_channels(n: usize) -> Vec<f64> {
-    (0..n * n)
-        .map(|k| if k / n == k % n { 1.0 } else { 0.0 })
-        .collect()
 }
 
 impl Fold {

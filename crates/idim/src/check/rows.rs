@@ -7,7 +7,6 @@ use idim_model::{
     Columns, DriveColumns, JointStates, LogSide, Model, ParameterKind, Robot,
     visit_torque_regressor,
 };
-use nalgebra::DMatrix;
 
 /// Low-pass of positions and torques alike, Hz: what arms are moved with.
 const CUTOFF: f64 = 10.0;
@@ -116,7 +115,7 @@ impl Samples {
         self.segments[self.at[0].0].interval
     }
 
-    /// States with motor `from[j]` times `scale[j]` in the place of motor `j`, and their largest speeds.
+    /// States with column `from[j]` times `scale[j]` in the place of joint `j`, and their largest speeds.
     pub(crate) fn read_as(
         &self,
         motors: &Motors,
@@ -125,13 +124,12 @@ impl Samples {
     ) -> (JointStates, Vec<f64>) {
         let mut states = self.states.clone();
         let (n, count) = (states.n_joints(), states.n_samples());
-        // q - zero, of the motors in turns of their own joints, read anew, and back.
         let change = motors.change_of_positions(from, scale);
         for j in 0..n {
             for k in 0..count {
                 let (mut q, mut qd, mut qdd) = (motors.zero[j], 0.0, 0.0);
                 for i in 0..n {
-                    let by = change[(j, i)];
+                    let by = change[j * n + i];
                     if by != 0.0 {
                         q += by * (self.states.q(i)[k] - motors.zero[i]);
                         qd += by * self.states.qd(i)[k];
@@ -152,18 +150,15 @@ impl Samples {
     }
 }
 
-/// How the columns of a log hang together with the joints: one and the same where logs are the joints'.
+/// What the columns of a log were multiplied by on their way to the joints. Couplings are left as they are: a fault of a
+/// motor that turns with several joints is looked for at its own joint.
 #[derive(Debug, Clone)]
 pub(crate) struct Motors {
-    /// Turns of each motor per turn of each joint, a motor's own joint counting one.
-    turns: DMatrix<f64>,
     /// Gear ratios where positions and torques are recorded at the motors, else ones.
     position_gear: Vec<f64>,
     torque_gear: Vec<f64>,
     /// The joints where the positions' columns are zero.
     zero: Vec<f64>,
-    positions: bool,
-    torques: bool,
 }
 
 impl Motors {
@@ -177,13 +172,7 @@ impl Motors {
             own.map(|g| if side { g.unwrap_or(1.0) } else { 1.0 })
                 .collect()
         };
-        let mut turns = DMatrix::identity(n, n);
-        for c in &drives.couplings {
-            let own = robot.joints()[c.motor].actuator.gear_ratio;
-            turns[(c.motor, c.joint)] = c.ratio / own.unwrap_or(1.0);
-        }
         Self {
-            turns,
             position_gear: gear(positions),
             torque_gear: gear(torques),
             zero: if positions {
@@ -191,38 +180,29 @@ impl Motors {
             } else {
                 vec![0.0; n]
             },
-            positions,
-            torques,
         }
     }
 
     /// Joint positions from joint positions, when the motors' columns are read otherwise.
-    fn change_of_positions(&self, from: &[usize], scale: &[f64]) -> DMatrix<f64> {
+    fn change_of_positions(&self, from: &[usize], scale: &[f64]) -> Vec<f64> {
         let n = from.len();
-        let mut reading = DMatrix::zeros(n, n);
+        let mut reading = vec![0.0; n * n];
         for (j, (&i, &by)) in from.iter().zip(scale).enumerate() {
             // A column under another joint's name was divided by that joint's ratio.
-            reading[(j, i)] = by * self.position_gear[i] / self.position_gear[j];
+            reading[j * n + i] = by * self.position_gear[i] / self.position_gear[j];
         }
-        match self.turns.clone().try_inverse() {
-            Some(inverse) if self.positions => inverse * reading * &self.turns,
-            _ => reading,
-        }
+        reading
     }
 
-    /// Torques of the joints from torques of the joints, when the columns are read otherwise: `[joint · n + channel]`.
+    /// Torque of each column's own joint from all columns, when they are read otherwise: `[joint · n + column]`.
     pub(crate) fn change_of_torques(&self, from: &[usize], scale: &[f64]) -> Vec<f64> {
         let n = from.len();
-        let mut reading = DMatrix::zeros(n, n);
+        let mut reading = vec![0.0; n * n];
         for (j, (&i, &by)) in from.iter().zip(scale).enumerate() {
-            reading[(j, i)] = by * self.torque_gear[j] / self.torque_gear[i];
+            // A column under another joint's name was multiplied by that joint's ratio.
+            reading[j * n + i] = by * self.torque_gear[j] / self.torque_gear[i];
         }
-        let joints_from_motors = self.turns.transpose();
-        let change = match joints_from_motors.clone().try_inverse() {
-            Some(inverse) if self.torques => joints_from_motors * reading * inverse,
-            _ => reading,
-        };
-        (0..n * n).map(|k| change[(k / n, k % n)]).collect()
+        reading
     }
 }
 
