@@ -1,7 +1,8 @@
 //! From what a run has at hand to the parts of a report.
 
-use super::data::{LogSummary, ReportData};
+use super::data::{LogSummary, ReportData, ReportedFinding};
 use super::report_html;
+use crate::check::CheckedFinding;
 use crate::identify::{Identification, Prediction, TRAINING_SHARE};
 use crate::log_spec::LogSpec;
 use crate::result::IdentificationResult;
@@ -60,6 +61,18 @@ pub(crate) fn file_settings(
     settings
 }
 
+/// A finding of the log doctor in words.
+fn reported(checked: &CheckedFinding) -> ReportedFinding {
+    let f = &checked.finding;
+    ReportedFinding {
+        code: f.code.into(),
+        grave: checked.waived,
+        place: f.place.to_string(),
+        met: f.met.clone(),
+        rule: format!("{}; {}", f.rule, f.next_step),
+    }
+}
+
 /// The page of an identification from logs.
 pub(crate) fn page_of_logs(
     found: &Identification,
@@ -67,6 +80,7 @@ pub(crate) fn page_of_logs(
     command: &str,
     settings: &[(String, String)],
 ) -> String {
+    let findings: Vec<ReportedFinding> = found.result.findings.iter().map(reported).collect();
     report_html(&ReportData {
         result: &found.result,
         robot,
@@ -74,7 +88,7 @@ pub(crate) fn page_of_logs(
         logs: &found.logs,
         spectrum: Some(&found.spectrum),
         cutoff: None,
-        findings: None,
+        findings: Some(&findings),
         tables: &[],
         figures: &[],
         paper: None,

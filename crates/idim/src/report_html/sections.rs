@@ -190,6 +190,10 @@ pub(super) fn data(data: &ReportData) -> Vec<Block> {
     if !data.logs.is_empty() {
         blocks.extend(logs_tables(data));
     }
+    if !data.result.inferred.is_empty() {
+        blocks.push(Block::Heading("How the files were read".into()));
+        blocks.push(Block::List(data.result.inferred.clone()));
+    }
     if !data.result.conditioning.is_empty() {
         blocks.push(Block::Heading("How the log became samples".into()));
         blocks.push(Block::List(data.result.conditioning.clone()));
