@@ -69,7 +69,8 @@ pub use regressor::{
     torque_regressor_into, visit_torque_regressor,
 };
 pub use robot::{
-    Actuator, Coupling, Drives, Joint, JointKind, JointLimits, KnownTorque, Link, LogSide, Robot,
+    Actuator, Capsule, Coupling, Drives, Joint, JointKind, JointLimits, KnownTorque, Link,
+    LinkCapsule, LogSide, Robot, Shapes,
 };
 pub use robot_file::{robot_from_ron, robot_to_ron};
 pub use states::{JointState, JointStates, random_states};

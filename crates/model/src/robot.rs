@@ -9,9 +9,11 @@ use nalgebra::Vector3;
 mod check;
 mod drives;
 mod known_torque;
+mod shapes;
 
 pub use drives::{Coupling, Drives, LogSide};
 pub use known_torque::KnownTorque;
+pub use shapes::{Capsule, LinkCapsule, Shapes};
 
 /// How a joint moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,6 +98,7 @@ pub struct Robot {
     joints: Vec<Joint>,
     links: Vec<Link>,
     drives: Drives,
+    shapes: Shapes,
     notes: Vec<String>,
 }
 
@@ -117,6 +120,7 @@ impl Robot {
             joints,
             links,
             drives: Drives::default(),
+            shapes: Shapes::default(),
             notes: Vec::new(),
         };
         robot.check()?;
@@ -196,6 +200,7 @@ impl Robot {
         let parent_from_link = held.pose(position);
         robot.turn_coupled_motors(joint, position - held.actuator.zero.unwrap_or(0.0));
         robot.drives = self.drives.without(joint);
+        robot.pass_capsules_on(joint, held.parent, &parent_from_link);
         for j in &mut robot.joints {
             match j.parent {
                 Some(p) if p == joint => {

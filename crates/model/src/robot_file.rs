@@ -14,14 +14,14 @@ pub use write::robot_to_ron;
 
 use crate::error::Error;
 use crate::pose::Pose;
-use crate::robot::{Joint, JointKind, Link, Robot};
+use crate::robot::{Joint, JointKind, Link, LinkCapsule, Robot, Shapes};
 use assembly::{DescribedJoint, MAX_JOINTS, assemble};
 use format::{Entry, File, Joints, Kind};
 use frames::{Frame, Reader};
 use nalgebra::Vector3;
 use ron::extensions::Extensions;
 use snapping::Snapping;
-use values::{actuator, inertial, limits};
+use values::{actuator, capsules, inertial, limits};
 
 /// A robot from the text of a RON robot file: modified DH, standard DH or general poses.
 ///
@@ -48,9 +48,9 @@ use values::{actuator, inertial, limits};
 /// ```
 pub fn robot_from_ron(text: &str) -> Result<Robot, Error> {
     let options = ron::Options::default().with_default_extension(Extensions::IMPLICIT_SOME);
-    let file: File = options.from_str(text).map_err(|e| refusal::from_ron(&e))?;
+    let mut file: File = options.from_str(text).map_err(|e| refusal::from_ron(&e))?;
     let mut snapping = Snapping::default();
-    let base = file.base.unwrap_or_default();
+    let base = file.base.take().unwrap_or_default();
     let mut reader = Reader {
         unit: file.angles,
         snapping: &mut snapping,
@@ -63,10 +63,39 @@ pub fn robot_from_ron(text: &str) -> Result<Robot, Error> {
         Joints::Poses(entries) => describe(text, entries, &base, &mut reader),
     }?;
     let gravity = Vector3::from(file.gravity.map(|v| v.0));
-    let robot = assemble(&file.name, gravity, described)?;
+    let shapes = shapes(&file, &described)?;
+    let robot = assemble(&file.name, gravity, described, shapes)?;
     let known = &file.known_torques;
     let drives = drives::drives(&file.joints, file.log, known, file.angles, &robot)?;
     Ok(robot.with_drives(drives)?.with_notes(snapping.into_notes()))
+}
+
+/// Obstacles, the ground and pairs that may touch, by the names of links.
+fn shapes(file: &File, described: &[DescribedJoint]) -> Result<Shapes, Error> {
+    let links = || described.iter().map(|d| d.link.name.as_str());
+    for name in file.may_touch.iter().flat_map(|(a, b)| [a, b]) {
+        let known = [BASE, GROUND].contains(&name.as_str()) || links().any(|l| l == name);
+        if !known {
+            return Err(Error::robot(
+                "may_touch",
+                format!("unknown link {name}"),
+                crate::suggestion::did_you_mean(name, links().chain([BASE, GROUND])),
+            ));
+        }
+    }
+    let obstacle = |capsule| LinkCapsule {
+        link: None,
+        capsule,
+    };
+    let pairs = file.may_touch.iter().cloned();
+    Ok(Shapes {
+        capsules: capsules(&file.obstacles)
+            .into_iter()
+            .map(obstacle)
+            .collect(),
+        ground: file.ground.map(f64::from),
+        may_touch: pairs.map(<[String; 2]>::from).collect(),
+    })
 }
 
 /// The joints of a file one after another, each with its place in the text.
@@ -103,6 +132,7 @@ fn describe<F: Frame>(
         described.push(DescribedJoint {
             joint,
             link,
+            capsules: capsules(&entry.capsules),
             fixed,
             line,
             column,
@@ -165,6 +195,8 @@ fn describe_joint<F: Frame>(
 
 /// What stands for the base where a parent is asked for.
 const BASE: &str = "base";
+/// What stands for the ground where links may touch it.
+const GROUND: &str = "ground";
 
 /// The entry an entry is mounted on: the one named, by its joint or else its link; the one before where none is named.
 fn parent<F>(entry: &Entry<F>, earlier: &[DescribedJoint]) -> Result<Option<usize>, Error> {

@@ -1,12 +1,13 @@
 //! Robots from URDF text.
 
+mod collision;
 mod document;
 mod tree;
 mod xml;
 
 use crate::error::Error;
 use crate::pose::Pose;
-use crate::robot::{Joint, JointKind, Link, Robot};
+use crate::robot::{Joint, JointKind, Link, LinkCapsule, Robot, Shapes};
 use crate::robot_file::assembly::{DescribedJoint, assemble, listed};
 use crate::robot_file::snapping::Snapping;
 use document::{Description, UrdfJoint, UrdfKind};
@@ -58,13 +59,33 @@ pub fn robot_from_urdf_with(text: &str, held: &[(String, f64)]) -> Result<Robot,
         &unknown(&description, &tree),
     ));
     notes.extend(snapping.into_notes());
-    let robot = assemble(&description.name, Vector3::from(GRAVITY), described)?;
+    notes.extend(listed(
+        "links whose collision meshes are left out: give them capsules where they may touch",
+        &meshes(&description),
+    ));
+    let of_root = description.links[tree.root].capsules.iter();
+    let shapes = Shapes {
+        capsules: of_root
+            .map(|&capsule| LinkCapsule {
+                link: None,
+                capsule,
+            })
+            .collect(),
+        ..Shapes::default()
+    };
+    let gravity = Vector3::from(GRAVITY);
+    let robot = assemble(&description.name, gravity, described, shapes)?;
     robot.with_notes(notes).hold_joints(&all_held)
 }
 
 fn gravity_note(description: &Description, tree: &Tree) -> String {
     let root = &description.links[tree.root].name;
     format!("a URDF states no gravity: (0, 0, -9.81) m/s² in the frame of link {root}")
+}
+
+fn meshes(description: &Description) -> Vec<String> {
+    let links = description.links.iter().filter(|l| l.n_meshes > 0);
+    links.map(|l| l.name.clone()).collect()
 }
 
 /// Links that move and state no inertial.
@@ -143,6 +164,7 @@ fn describe(description: &Description, branch: &Branch) -> DescribedJoint {
             name: link.name.clone(),
             inertial: link.inertial,
         },
+        capsules: link.capsules.clone(),
         fixed: joint.kind == UrdfKind::Fixed,
         line: joint.line,
         column: joint.column,

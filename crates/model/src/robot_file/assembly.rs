@@ -3,7 +3,7 @@
 use super::plausibility::impossibility;
 use crate::error::Error;
 use crate::parameter::InertialParameters;
-use crate::robot::{Joint, Link, Robot};
+use crate::robot::{Capsule, Joint, Link, LinkCapsule, Robot, Shapes};
 use nalgebra::Vector3;
 
 /// Most joints of one robot: the work on a tree of joints grows with the square.
@@ -15,6 +15,8 @@ pub(crate) struct DescribedJoint {
     pub(crate) joint: Joint,
     /// The link it carries.
     pub(crate) link: Link,
+    /// Bodies around the link, in its frame.
+    pub(crate) capsules: Vec<Capsule>,
     /// It does not move; `joint` holds some revolute joint at position zero.
     pub(crate) fixed: bool,
     /// Line of the joint in the file.
@@ -24,10 +26,13 @@ pub(crate) struct DescribedJoint {
 }
 
 /// Checks each joint where it stands in the file, folds the fixed ones into their parents and says so.
+///
+/// `shapes`: what is not of a link; the links' own capsules are added.
 pub(crate) fn assemble(
     name: &str,
     gravity: Vector3<f64>,
     mut described: Vec<DescribedJoint>,
+    mut shapes: Shapes,
 ) -> Result<Robot, Error> {
     for d in &described {
         let checked = d.joint.check().and_then(|()| d.link.check());
@@ -51,8 +56,15 @@ pub(crate) fn assemble(
     let fixed: Vec<usize> = (0..described.len())
         .filter(|&i| described[i].fixed)
         .collect();
+    for (link, d) in described.iter_mut().enumerate() {
+        let own = std::mem::take(&mut d.capsules).into_iter();
+        shapes.capsules.extend(own.map(|capsule| LinkCapsule {
+            link: Some(link),
+            capsule,
+        }));
+    }
     let (joints, links) = described.into_iter().map(|d| (d.joint, d.link)).unzip();
-    let mut robot = Robot::new(name, gravity, joints, links)?;
+    let mut robot = Robot::new(name, gravity, joints, links)?.with_shapes(shapes)?;
     // From the tips inwards, so that what a fixed joint carries is complete when it is folded.
     for &i in fixed.iter().rev() {
         robot = robot.lock(i, 0.0);

@@ -57,6 +57,12 @@ pub(super) struct File {
     pub(super) log: Option<LogSides>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) known_torques: Vec<Known>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(super) ground: Option<Number>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) obstacles: Vec<Capsule>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) may_touch: Vec<(String, String)>,
     pub(super) joints: Joints,
 }
 
@@ -87,6 +93,15 @@ pub(super) struct Known {
     pub(super) with: Vec<(String, String)>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) formula: Option<String>,
+}
+
+/// All points within a radius of a segment.
+#[derive(Debug, Clone, Copy, Deserialize, Serialize)]
+#[serde(deny_unknown_fields, rename = "Capsule")]
+pub(super) struct Capsule {
+    pub(super) from: [Number; 3],
+    pub(super) to: [Number; 3],
+    pub(super) radius: Number,
 }
 
 /// Unit of every angle, angular speed and angular acceleration of the file.
@@ -131,6 +146,8 @@ pub(super) struct Entry<F> {
     pub(super) actuator: Option<Drive>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) inertial: Option<Inertial>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) capsules: Vec<Capsule>,
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, Serialize)]

@@ -1,9 +1,9 @@
 //! Limits, drives and inertial values between the file and the robot, both ways.
 
-use super::format::{AngleUnit, Drive, Inertial, Limits, Number, Tensor};
+use super::format::{self, AngleUnit, Drive, Inertial, Limits, Number, Tensor};
 use super::frames::radians;
 use crate::parameter::InertialParameters;
-use crate::robot::{Actuator, JointKind, JointLimits};
+use crate::robot::{Actuator, Capsule, JointKind, JointLimits};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeMap;
 
@@ -74,6 +74,24 @@ pub(super) fn inertial(inertial: &Inertial) -> InertialParameters {
             mz,
             m,
         } => InertialParameters([xx, xy, xz, yy, yz, zz, mx, my, mz, m].map(|v| v.0)),
+    }
+}
+
+pub(super) fn capsules(capsules: &[format::Capsule]) -> Vec<Capsule> {
+    let point = |p: [Number; 3]| Vector3::from(p.map(f64::from));
+    let capsule = |c: &format::Capsule| Capsule {
+        ends: [point(c.from), point(c.to)],
+        radius: c.radius.0,
+    };
+    capsules.iter().map(capsule).collect()
+}
+
+pub(super) fn capsule_to_file(capsule: &Capsule) -> format::Capsule {
+    let [from, to] = capsule.ends.map(|e| [e.x, e.y, e.z].map(Number));
+    format::Capsule {
+        from,
+        to,
+        radius: Number(capsule.radius),
     }
 }
 

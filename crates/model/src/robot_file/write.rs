@@ -2,7 +2,7 @@
 
 use super::drives::{coupled_to_file, known_to_file, log_to_file};
 use super::format::{AngleUnit, Entry, File, Joints, Kind, Number, PoseFrame};
-use super::values::{actuator_to_file, inertial_to_file, limits_to_file};
+use super::values::{actuator_to_file, capsule_to_file, inertial_to_file, limits_to_file};
 use crate::pose::Pose;
 use crate::robot::{Joint, JointKind, Link, Robot};
 use nalgebra::Matrix3;
@@ -14,13 +14,22 @@ use ron::ser::PrettyConfig;
 /// `robot_from_ron(&robot_to_ron(&robot))` is the same robot to rounding: rotations pass through roll, pitch and yaw.
 /// Inertial values are written about the origin of the link's frame; [`Robot::notes`] are not written.
 pub fn robot_to_ron(robot: &Robot) -> String {
+    let capsules_of = |link: Option<usize>| -> Vec<_> {
+        let all = robot.shapes().capsules.iter();
+        let own = all.filter(|c| c.link == link);
+        own.map(|c| capsule_to_file(&c.capsule)).collect()
+    };
     let entries = robot
         .joints()
         .iter()
         .zip(robot.links())
         .enumerate()
-        .map(|(i, (joint, link))| entry(robot, i, joint, link))
+        .map(|(i, (joint, link))| Entry {
+            capsules: capsules_of(Some(i)),
+            ..entry(robot, i, joint, link)
+        })
         .collect();
+    let pairs = robot.shapes().may_touch.iter();
     let file = File {
         name: robot.name().to_owned(),
         about: None,
@@ -33,6 +42,9 @@ pub fn robot_to_ron(robot: &Robot) -> String {
         base: None,
         log: log_to_file(robot.drives()),
         known_torques: known_to_file(robot),
+        ground: robot.shapes().ground.map(Number),
+        obstacles: capsules_of(None),
+        may_touch: pairs.cloned().map(<(String, String)>::from).collect(),
         joints: Joints::Poses(entries),
     };
     let layout = PrettyConfig::new().struct_names(false).depth_limit(3);
@@ -68,6 +80,7 @@ fn entry(robot: &Robot, index: usize, joint: &Joint, link: &Link) -> Entry<PoseF
         limits: limits_to_file(&joint.limits),
         actuator: actuator_to_file(&joint.actuator, coupled_to_file(robot, index)),
         inertial: link.inertial.as_ref().map(inertial_to_file),
+        capsules: Vec::new(),
     }
 }
 

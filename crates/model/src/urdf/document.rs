@@ -1,10 +1,11 @@
 //! The links and joints of a URDF, read and placed; everything else in the file is left alone.
 
+use super::collision::read_collisions;
 use super::xml::{Xml, child};
 use crate::error::Error;
 use crate::parameter::InertialParameters;
 use crate::pose::Pose;
-use crate::robot::{Actuator, JointLimits};
+use crate::robot::{Actuator, Capsule, JointLimits};
 use crate::robot_file::assembly::MAX_JOINTS;
 use crate::robot_file::snapping::Snapping;
 use crate::suggestion::did_you_mean;
@@ -14,6 +15,10 @@ use roxmltree::Node;
 pub(super) struct UrdfLink {
     pub(super) name: String,
     pub(super) inertial: Option<InertialParameters>,
+    /// Bodies that enclose the collision shapes.
+    pub(super) capsules: Vec<Capsule>,
+    /// Collision shapes that were left out.
+    pub(super) n_meshes: usize,
     pub(super) line: usize,
     pub(super) column: usize,
 }
@@ -108,10 +113,13 @@ fn read_link(xml: &Xml, node: Node, not_stated: &mut Vec<String>) -> Result<Urdf
             inertial = Some(read);
         }
     }
+    let (capsules, n_meshes) = read_collisions(xml, node, &format!("link {name}"))?;
     let (line, column) = xml.position(node.range().start);
     Ok(UrdfLink {
         name: name.to_owned(),
         inertial,
+        capsules,
+        n_meshes,
         line,
         column,
     })
@@ -160,7 +168,7 @@ fn read_inertial(xml: &Xml, node: Node, place: &str) -> Result<InertialParameter
 }
 
 /// `xyz` and `rpy` of the `<origin>` of an element, zero where not stated.
-fn read_origin(xml: &Xml, node: Node, place: &str) -> Result<[[f64; 3]; 2], Error> {
+pub(super) fn read_origin(xml: &Xml, node: Node, place: &str) -> Result<[[f64; 3]; 2], Error> {
     let Some(origin) = child(node, "origin") else {
         return Ok([[0.0; 3]; 2]);
     };
