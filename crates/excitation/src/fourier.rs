@@ -2,7 +2,7 @@
 
 use crate::fourier_rounds::{Outcome, run_rounds, try_at_random};
 use crate::fourier_search::Task;
-use crate::{Conditioning, Error, FourierOptions};
+use crate::{ClearanceCertificate, Conditioning, Error, FourierOptions, TorqueCertificate};
 use idim_model::{Columns, Model};
 use idim_trajectory::{Certificate, FourierSeries, Limits};
 use std::sync::atomic::AtomicBool;
@@ -20,8 +20,12 @@ pub struct FourierDesign {
     pub conditioning: Conditioning,
     /// Largest use of each limit; always certified.
     pub certificate: Certificate,
-    /// Value of the criterion after every search, round by round; infinite where a search led nowhere. With further
-    /// criteria: the weighted sum.
+    /// Largest use of the torque limits, where they were asked for; always certified.
+    pub torque: Option<TorqueCertificate>,
+    /// Smallest distance, where it was asked for; always certified.
+    pub clearance: Option<ClearanceCertificate>,
+    /// Value of the criterion after every search, round by round, of the motions given as starts, and after the last
+    /// descent; infinite where a search led nowhere. With further criteria: the weighted sum.
     pub values: Vec<f64>,
     /// Rounds that were completed, the first included.
     pub n_rounds: usize,
@@ -108,7 +112,12 @@ fn design(task: &Task<'_>, outcome: Outcome) -> Result<FourierDesign, Error> {
     let Some(best) = outcome.best.into_iter().next() else {
         return Err(Error::NoFeasibleMotion {
             starts: outcome.values.len(),
-            rule: "give more starts, or wider limits".into(),
+            rule: match (&options.torque, &options.clearance) {
+                (None, None) => "give more starts, or wider limits".into(),
+                _ => "give more starts, a larger share of the torque limits, less clearance, or leave out bodies that \
+                      cannot but touch"
+                    .into(),
+            },
         });
     };
     let n_samples = REPORT_REFINEMENT * options.n_samples;
@@ -117,6 +126,8 @@ fn design(task: &Task<'_>, outcome: Outcome) -> Result<FourierDesign, Error> {
         conditioning: series_conditioning(task.model, task.columns, &best.series, n_samples),
         series: best.series,
         certificate: best.certificate,
+        torque: best.path.torque,
+        clearance: best.path.clearance,
         values: values.map(|&v| options.value_of_logarithm(v)).collect(),
         n_rounds: outcome.n_rounds,
         n_evaluations: outcome.n_evaluations,
@@ -134,8 +145,34 @@ pub fn series_conditioning(
     series: &FourierSeries,
     n_samples: usize,
 ) -> Conditioning {
+    weighted_conditioning(
+        model,
+        columns,
+        series,
+        n_samples,
+        &vec![1.0; model.n_joints()],
+    )
+}
+
+/// As [`series_conditioning`], of the rows divided by the standard deviation of their joint's torque, N·m.
+///
+/// # Panics
+/// As [`series_conditioning`], or if there is not one standard deviation a joint.
+#[track_caller]
+pub fn weighted_conditioning(
+    model: &Model,
+    columns: &Columns,
+    series: &FourierSeries,
+    n_samples: usize,
+    torque_noise: &[f64],
+) -> Conditioning {
+    let n = model.n_joints();
+    assert_eq!(torque_noise.len(), n, "one standard deviation per joint");
     let states = series.equispaced_states(n_samples);
-    let w = idim_model::observation_matrix(model, columns, &states);
+    let mut w = idim_model::observation_matrix(model, columns, &states);
+    for (row, mut entries) in w.row_iter_mut().enumerate() {
+        entries /= torque_noise[row % n];
+    }
     let w = faer::MatRef::from_column_major_slice(w.as_slice(), w.nrows(), w.ncols());
     Conditioning::of_rows(w, n_samples)
 }

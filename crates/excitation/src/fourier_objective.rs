@@ -6,6 +6,7 @@
 use crate::FourierOptions;
 use crate::fourier_contraction::Contraction;
 use crate::information::information_matrix;
+use crate::path_penalty::PathPenalty;
 use crate::spectrum::{SmoothCriterion, SpectralPoint};
 use faer::Mat;
 use idim_model::{Columns, JointStates, Model, regressor_contraction_gradient};
@@ -25,6 +26,9 @@ pub(crate) struct FourierObjective<'a> {
     prior: Option<Mat<f64>>,
     states: JointStates,
     points: Vec<SpectralPoint>,
+    /// Conditions on the path; counted in smoothed values only.
+    pub(crate) path: Option<PathPenalty<'a>>,
+    smoothed: bool,
     n_evaluations: usize,
 }
 
@@ -33,7 +37,7 @@ impl<'a> FourierObjective<'a> {
         model: &'a Model,
         columns: &'a Columns,
         criteria: &[(f64, SmoothCriterion)],
-        options: &FourierOptions,
+        options: &'a FourierOptions,
     ) -> Self {
         let joint_weights = if options.torque_noise.is_empty() {
             vec![1.0; model.n_joints()]
@@ -52,6 +56,8 @@ impl<'a> FourierObjective<'a> {
             prior: prior.map(|a| faer::Scale(options.n_samples as f64) * a),
             states: JointStates::zeros(model.n_joints(), options.n_samples),
             points: Vec::new(),
+            path: PathPenalty::new(model, options),
+            smoothed: false,
             n_evaluations: 0,
         }
     }
@@ -60,9 +66,11 @@ impl<'a> FourierObjective<'a> {
         self.n_evaluations
     }
 
-    /// Puts norms of this power in the place of extreme eigenvalues; `None`: the criteria themselves.
+    /// Puts norms of this power in the place of extreme eigenvalues, and adds the penalty of the path; `None`: the
+    /// criteria themselves.
     pub(crate) fn smooth(&mut self, power: Option<f64>) {
         self.criteria.clone_from(&self.exact);
+        self.smoothed = power.is_some();
         if let Some(power) = power {
             for (_, criterion) in &mut self.criteria {
                 *criterion = criterion.smoothed(power);
@@ -82,7 +90,13 @@ impl<'a> FourierObjective<'a> {
         let (a, n) = (information.as_ref(), self.basis.n_samples());
         self.points = self.criteria.iter().map(|(_, c)| c.at(a, n)).collect();
         let terms = self.criteria.iter().zip(&self.points);
-        terms.map(|((weight, _), point)| weight * point.value).sum()
+        let value: f64 = terms.map(|((weight, _), point)| weight * point.value).sum();
+        value + self.active_path().map_or(0.0, |p| p.value(coefficients))
+    }
+
+    fn active_path(&mut self) -> Option<&mut PathPenalty<'a>> {
+        let smoothed = self.smoothed;
+        self.path.as_mut().filter(|_| smoothed)
     }
 
     /// Gradient where the value was asked for last; zero where that was infinite.
@@ -98,7 +112,13 @@ impl<'a> FourierObjective<'a> {
             regressor_contraction_gradient(self.model, self.columns, &self.states, |y, g| {
                 contraction.contract(y, weights, g);
             });
-        self.basis.pull_back(&by_states)
+        let mut gradient = self.basis.pull_back(&by_states);
+        if let Some(path) = self.active_path() {
+            for (g, p) in gradient.iter_mut().zip(path.gradient()) {
+                *g += p;
+            }
+        }
+        gradient
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a search for a Fourier motion is asked for, and whether it makes sense.
 
 use crate::spectrum::SmoothCriterion;
-use crate::{Criterion, Error, Scaling};
+use crate::{Clearance, Criterion, Error, Scaling, TorquePrior};
 use faer::Mat;
 use idim_model::{Columns, Model};
 use idim_trajectory::{FourierSeries, Limits};
@@ -40,9 +40,14 @@ pub struct FourierOptions {
     /// `Σ Yᵀ D Y` of earlier logs (columns × columns, `D` the inverse squared noise), over the number of samples this
     /// motion will add: the motion is then the best complement of those logs.
     pub prior_information: Option<Mat<f64>>,
+    /// Torque limits to keep by a prediction of the same robot's torques, at every instant.
+    pub torque: Option<TorquePrior>,
+    /// Distances the same robot has to keep, at every instant.
+    pub clearance: Option<Clearance>,
     /// Searches of a round. Typical 8.
     pub n_starts: usize,
-    /// Motions the first searches start from; the others start from random ones. Period and harmonics as above.
+    /// Motions the first searches start from; the others start from random ones. Period and harmonics as above. What is
+    /// returned is never worse than one of them inside the limits.
     pub starts: Vec<FourierSeries>,
     /// Rounds of searches from beside the best motions, after the first. Typical 2.
     pub n_rounds: usize,
@@ -67,6 +72,8 @@ impl Default for FourierOptions {
             ends: FourierEnds::Free,
             torque_noise: Vec::new(),
             prior_information: None,
+            torque: None,
+            clearance: None,
             n_starts: 8,
             starts: Vec::new(),
             n_rounds: 2,
@@ -185,6 +192,19 @@ fn check_joints(model: &Model, limits: &Limits, options: &FourierOptions) -> Res
             format!("{} joints", limits.n_joints()),
             format!("the model has {n}; give limits for each"),
         ));
+    }
+    let robots = [
+        options.torque.as_ref().map(TorquePrior::robot),
+        options.clearance.as_ref().map(Clearance::robot),
+    ];
+    for robot in robots.into_iter().flatten() {
+        if robot.n_joints() != n {
+            return Err(Error::input(
+                "torque and clearance",
+                format!("a robot of {} joints", robot.n_joints()),
+                format!("the model has {n}; take the same robot"),
+            ));
+        }
     }
     let noise = &options.torque_noise;
     if !noise.is_empty() && (noise.len() != n || noise.iter().any(|&s| !(s > 0.0 && s.is_finite())))

@@ -1,7 +1,7 @@
 //! Many searches: from given and random motions first, then round by round from beside the best ones.
 
 use crate::fourier::FourierProgress;
-use crate::fourier_search::{EXPLORE, FINISH, Found, REVISIT, Search, Task};
+use crate::fourier_search::{EXPLORE, Found, REVISIT, Search, Task};
 use idim_trajectory::{FourierSeries, random_series};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -51,7 +51,7 @@ impl Outcome {
 
 /// Value of many random motions, each drawn in to meet the limits, and the best of them.
 pub(crate) fn try_at_random(task: &Task<'_>, n_motions: usize) -> Outcome {
-    let searches = (0..n_motions)
+    let searches: Vec<Search> = (0..n_motions)
         .into_par_iter()
         .map(|place| {
             let seed = rng(task.options.seed, usize::MAX, place).random();
@@ -61,7 +61,25 @@ pub(crate) fn try_at_random(task: &Task<'_>, n_motions: usize) -> Outcome {
         })
         .collect();
     let mut outcome = Outcome::empty();
-    outcome.add(searches);
+    // Proofs are long: from the best down, the first that has one.
+    let mut order: Vec<&Found> = searches.iter().filter_map(|s| s.found.as_ref()).collect();
+    order.sort_by(|a, b| a.value.total_cmp(&b.value));
+    outcome.best = order
+        .into_iter()
+        .find_map(|f| task.proved(f))
+        .into_iter()
+        .collect();
+    for search in &searches {
+        outcome.n_evaluations += search.n_evaluations;
+        let value = search.found.as_ref().map_or(f64::INFINITY, |f| f.value);
+        outcome.values.push(value);
+    }
+    // A value below the one returned belongs to a motion without a proof.
+    if let Some(best) = outcome.best.first() {
+        for value in outcome.values.iter_mut().filter(|v| **v < best.value) {
+            *value = f64::INFINITY;
+        }
+    }
     outcome
 }
 
@@ -96,10 +114,15 @@ pub(crate) fn run_rounds(task: &Task<'_>, progress: &(dyn Fn(&FourierProgress) +
         outcome.add(searches);
         outcome.n_rounds = round + usize::from(!task.stopped());
     }
-    if let Some(best) = outcome.best.first()
-        && !task.stopped()
-    {
-        let last = task.search(&best.series.coefficients(), FINISH);
+    // A motion that was given as a start may be better than all that was found from it: kinks stop a descent.
+    let given = task.options.starts.iter().map(|series| {
+        let mut search = task.evaluate(&series.coefficients());
+        search.found = search.found.and_then(|f| task.proved(&f));
+        search
+    });
+    outcome.add(given.collect());
+    if let Some(best) = outcome.best.first() {
+        let last = task.finish(&best.series.coefficients());
         outcome.add(vec![last]);
     }
     outcome

@@ -5,6 +5,7 @@ use crate::fourier_interior::Interior;
 use crate::fourier_limits::Bounds;
 use crate::fourier_objective::FourierObjective;
 use crate::fourier_options::check;
+use crate::path_penalty::PathCertificates;
 use crate::spectrum::SmoothCriterion;
 use crate::{Error, FourierOptions};
 use idim_model::{Columns, Model};
@@ -38,7 +39,7 @@ pub(crate) const REVISIT: Schedule = Schedule {
     sharp_stage: 3,
 };
 /// From a good motion: the last tenths of a percent.
-pub(crate) const FINISH: Schedule = Schedule {
+const FINISH: Schedule = Schedule {
     power: 100.0,
     barrier: 1e-5,
     n_stages: 6,
@@ -50,6 +51,10 @@ const SHARPENING: [f64; 2] = [1.4, 0.5];
 const MAX_STEPS: usize = 15;
 /// A stage ends when a step promises less than this share of what the smoothing still hides.
 const STAGE_TOLERANCE: f64 = 0.1;
+/// With conditions on the path: stages more, at most, until they can be proved.
+const REPAIRS: usize = 8;
+/// A random motion that breaks such a condition is drawn in by this factor, so many times at most.
+const DRAW: (f64, usize) = (0.75, 6);
 /// A start comes this near to the limits at most: the barrier is infinite on them.
 const LARGEST_USE: f64 = 0.98;
 
@@ -69,6 +74,8 @@ pub(crate) struct Task<'a> {
 pub(crate) struct Found {
     pub(crate) series: FourierSeries,
     pub(crate) certificate: Certificate,
+    /// Proofs that torque limits and distances hold.
+    pub(crate) path: PathCertificates,
     /// Logarithm of the criterion.
     pub(crate) value: f64,
 }
@@ -114,19 +121,63 @@ impl<'a> Task<'a> {
         )
     }
 
-    /// These coefficients as they are, but for what exceeds the limits.
+    /// These coefficients as they are, but for what exceeds the limits; conditions on the path hold at samples.
     pub(crate) fn evaluate(&self, c: &[f64]) -> Search {
         let mut objective = self.objective();
-        let found = self.bounds().certified(&self.chart.variables(c));
-        let found = found.and_then(|found| valued(&mut objective, found));
+        let bounds = self.bounds();
+        let mut x = self.chart.variables(c);
+        let mut found = bounds.certified(&x);
+        if let Some(mut path) = objective.path.take() {
+            for _ in 0..DRAW.1 {
+                let held = found.filter(|(s, _)| path.held_at_samples(&s.coefficients()));
+                found = held;
+                if found.is_some() {
+                    break;
+                }
+                for x in &mut x {
+                    *x *= DRAW.0;
+                }
+                found = bounds.certified(&x);
+            }
+            found = found.filter(|(s, _)| path.held_at_samples(&s.coefficients()));
+        }
+        let found =
+            found.and_then(|found| valued(&mut objective, found, PathCertificates::default()));
         Search {
             found,
             n_evaluations: objective.n_evaluations(),
         }
     }
 
+    /// A motion of [`evaluate`](Self::evaluate) with the proofs it lacks; `None` where there is none.
+    pub(crate) fn proved(&self, found: &Found) -> Option<Found> {
+        let Some(mut path) = self.objective().path.take() else {
+            return Some(found.clone());
+        };
+        let path = path.certify(&found.series)?;
+        Some(Found {
+            path,
+            ..found.clone()
+        })
+    }
+
     fn objective(&self) -> FourierObjective<'_> {
         FourierObjective::new(self.model, self.columns, &self.criteria, self.options)
+    }
+
+    /// The last tenths of a percent from a good motion; short enough to be taken even by who was told to stop.
+    pub(crate) fn finish(&self, start: &[f64]) -> Search {
+        let never = AtomicBool::new(false);
+        let task = Task {
+            model: self.model,
+            columns: self.columns,
+            criteria: self.criteria.clone(),
+            limits: self.limits,
+            options: self.options,
+            chart: self.chart.clone(),
+            stop: &never,
+        };
+        task.search(start, FINISH)
     }
 
     /// Searches from these coefficients; told to stop, it returns what it has.
@@ -138,7 +189,8 @@ impl<'a> Task<'a> {
         let bounds = self.bounds();
         let mut descent = Interior::new(bounds, &mut objective, x, LARGEST_USE, barrier);
         let mut best: Option<Found> = None;
-        for stage in 0..schedule.n_stages {
+        let repairs = descent.objective.path.as_ref().map_or(0, |_| REPAIRS);
+        for stage in 0..schedule.n_stages + repairs {
             descent.objective.smooth(Some(power));
             if stage >= schedule.sharp_stage {
                 descent.sharpen(barrier);
@@ -146,16 +198,23 @@ impl<'a> Task<'a> {
                 descent.evaluate();
             }
             self.descend(&mut descent, power, barrier);
-            let done = self.stopped() || self.used_up(&descent) || stage + 1 == schedule.n_stages;
+            let last = stage + 1 >= schedule.n_stages;
+            let enough = last && (repairs == 0 || best.is_some());
+            let done = self.stopped() || self.used_up(&descent) || enough;
             // The last stages differ by less than the limits between their instants: the best of them counts.
             if done || stage + 3 >= schedule.n_stages {
                 keep_better(&mut descent, &mut best);
             }
-            if done {
+            if done || (last && best.is_some()) {
                 break;
             }
-            power *= SHARPENING[0];
-            barrier *= SHARPENING[1];
+            if let Some(path) = &mut descent.objective.path {
+                path.move_shifts();
+            }
+            if !last {
+                power *= SHARPENING[0];
+                barrier *= SHARPENING[1];
+            }
         }
         Search {
             found: best,
@@ -164,7 +223,9 @@ impl<'a> Task<'a> {
     }
 
     fn used_up(&self, descent: &Interior<'_, '_>) -> bool {
-        descent.objective.n_evaluations() >= self.options.max_evaluations
+        // Conditions on the path are approached from outside, which takes as long again.
+        let times = 1 + usize::from(descent.objective.path.is_some());
+        descent.objective.n_evaluations() >= times * self.options.max_evaluations
     }
 
     fn descend(&self, descent: &mut Interior<'_, '_>, power: f64, barrier: f64) {
@@ -185,22 +246,33 @@ impl<'a> Task<'a> {
 fn keep_better(descent: &mut Interior<'_, '_>, best: &mut Option<Found>) {
     let found = descent.bounds.certified(&descent.x);
     descent.objective.smooth(None);
-    if let Some(found) = found.and_then(|found| valued(descent.objective, found))
-        && best.as_ref().is_none_or(|b| found.value < b.value)
-    {
-        *best = Some(found);
+    let Some(found) = found else { return };
+    let Some(mut found) = valued(descent.objective, found, PathCertificates::default()) else {
+        return;
+    };
+    if best.as_ref().is_some_and(|b| b.value <= found.value) {
+        return;
     }
+    if let Some(path) = &mut descent.objective.path {
+        let Some(proofs) = path.certify(&found.series) else {
+            return;
+        };
+        found.path = proofs;
+    }
+    *best = Some(found);
 }
 
 /// The motion with its value, unless columns are dependent.
 fn valued(
     objective: &mut FourierObjective<'_>,
     (series, certificate): (FourierSeries, Certificate),
+    path: PathCertificates,
 ) -> Option<Found> {
     let value = objective.value(&series.coefficients());
     value.is_finite().then_some(Found {
         series,
         certificate,
+        path,
         value,
     })
 }

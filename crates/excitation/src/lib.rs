@@ -31,6 +31,7 @@
 //! (`idim-trajectory`), estimation.
 
 mod box_lbfgs;
+mod clearance;
 mod criterion;
 mod dense;
 mod energy;
@@ -48,6 +49,8 @@ mod fourier_rounds;
 mod fourier_search;
 mod information;
 mod padded;
+mod path_certificate;
+mod path_penalty;
 mod point_descent;
 mod point_moves;
 mod point_objective;
@@ -59,18 +62,24 @@ mod points_search;
 mod powell;
 mod random_condition;
 mod schatten;
+mod segments;
 mod spectrum;
+mod torque_prior;
+mod torque_rate;
 
+pub use clearance::Clearance;
 pub use criterion::{ConditionNumbers, Conditioning, Criterion, Equilibrium, Scaling};
 pub use error::Error;
 pub use fourier::{
     FourierDesign, FourierProgress, FourierWatch, best_random_fourier, optimise_fourier,
-    optimise_fourier_watched, series_conditioning,
+    optimise_fourier_watched, series_conditioning, weighted_conditioning,
 };
 pub use fourier_options::{FourierEnds, FourierOptions};
 pub use information::information_matrix;
+pub use path_certificate::{ClearanceCertificate, TorqueCertificate};
 pub use points::{EnergyDesign, PointLimits};
 pub use points_powell::{PointDesign, PowellPointOptions, optimise_points_powell};
 pub use points_search::{PointSearchOptions, SearchProgress, search_points};
 pub use powell::{PowellOptions, PowellOutcome, powell};
 pub use random_condition::{ConditionStatistics, random_condition_statistics};
+pub use torque_prior::TorquePrior;

@@ -1,0 +1,173 @@
+//! Distances between the bodies of a robot: their gradient, their proof, and what is refused.
+#![allow(clippy::unwrap_used)]
+
+use idim_excitation::{Clearance, Error, FourierOptions, TorquePrior, optimise_fourier};
+use idim_model::{
+    Columns, DriveColumns, JointState, JointStates, Model, Robot, inverse_dynamics, random_states,
+    robot_from_ron,
+};
+use idim_trajectory::Limits;
+
+/// An upright arm of two links between two posts.
+fn planar(posts: &str) -> Robot {
+    let text = format!(
+        "(
+            name: \"planar\", angles: Radians, gravity: (0, -9.81, 0), {posts}
+            joints: StandardDh([
+                (name: \"a\", frame: (a: 0.5),
+                 limits: (position: (-1.5, 1.5), velocity: 2, acceleration: 8, torque: 30),
+                 actuator: (viscous_friction: 0.2, coulomb_friction: 0.5),
+                 inertial: CentreOfMass(mass: 2, centre: (-0.25, 0, 0), inertia: (xx: 0.01, yy: 0.05, zz: 0.05)),
+                 capsules: [(from: (-0.5, 0, 0), to: (0, 0, 0), radius: 0.05)]),
+                (name: \"b\", frame: (a: 0.4),
+                 limits: (position: (-2.5, 2.5), velocity: 3, acceleration: 10, torque: 10),
+                 inertial: CentreOfMass(mass: 1, centre: (-0.2, 0, 0), inertia: (xx: 0.005, yy: 0.02, zz: 0.02)),
+                 capsules: [(from: (-0.4, 0, 0), to: (0, 0, 0), radius: 0.04)]),
+            ]),
+        )"
+    );
+    robot_from_ron(&text).unwrap()
+}
+
+const POST: &str = "obstacles: [(from: (0.3, 0.75, -1), to: (0.3, 0.75, 1), radius: 0.05)],";
+
+fn options(robot: &Robot) -> FourierOptions {
+    FourierOptions {
+        period: 6.0,
+        n_harmonics: 3,
+        n_samples: 60,
+        n_starts: 4,
+        n_rounds: 0,
+        torque: Some(TorquePrior::new(robot, 0.8).unwrap()),
+        clearance: Clearance::new(robot, 0.02).unwrap(),
+        ..FourierOptions::default()
+    }
+}
+
+/// The base parameters of a planar arm, and viscous friction.
+fn columns() -> Columns {
+    use idim_model::ParameterKind::{Fv, MX, MY, ZZ};
+    let named = [
+        (ZZ, 0),
+        (MX, 0),
+        (MY, 0),
+        (ZZ, 1),
+        (MX, 1),
+        (MY, 1),
+        (Fv, 0),
+        (Fv, 1),
+    ];
+    Columns(
+        named
+            .map(|(kind, index)| idim_model::Parameter { kind, index })
+            .to_vec(),
+    )
+}
+
+#[test]
+fn identity_a_motion_keeps_clear_and_within_torques_at_every_instant() {
+    let robot = planar(POST);
+    let (model, limits) = (Model::new(&robot), Limits::from_robot(&robot).unwrap());
+    let options = options(&robot);
+    let found = optimise_fourier(&model, &columns(), &limits, &options).unwrap();
+    let clearance = found.clearance.unwrap();
+    assert!(clearance.bound >= 0.02 && clearance.distance >= clearance.bound);
+    // A hundred times finer than the criterion's samples.
+    let states = found.series.equispaced_states(6000);
+    let nearest = options.clearance.as_ref().unwrap().nearest(&states);
+    let least = nearest.iter().map(|n| n.1).fold(f64::INFINITY, f64::min);
+    assert!(
+        least >= clearance.bound,
+        "{least} below {}",
+        clearance.bound
+    );
+    // What was found by samples is nowhere far from the least there is.
+    assert!(clearance.distance <= least + 1e-3);
+    let torque = found.torque.unwrap();
+    let inertial = robot.standard_parameters().unwrap();
+    for k in 0..6000 {
+        let s = states.state(k);
+        let tau = inverse_dynamics(&model, &inertial, &s);
+        for (j, joint) in robot.joints().iter().enumerate() {
+            let friction = joint.actuator.viscous_friction.unwrap_or(0.0) * s.qd[j];
+            let coulomb = joint.actuator.coulomb_friction.unwrap_or(0.0);
+            let used = ((tau[j] + friction).abs() + coulomb) / joint.limits.torque.unwrap();
+            let bound = torque.joints[j].unwrap().bound;
+            assert!(used <= bound && bound <= 0.8, "{used}, {bound}");
+        }
+    }
+    // Without the conditions both are broken: they are what holds the motion.
+    let free = FourierOptions {
+        torque: None,
+        clearance: None,
+        ..options.clone()
+    };
+    let free = optimise_fourier(&model, &columns(), &limits, &free).unwrap();
+    let nearest = options
+        .clearance
+        .unwrap()
+        .nearest(&free.series.equispaced_states(600));
+    assert!(nearest.iter().any(|n| n.1 < 0.02));
+    assert!(free.torque.is_none() && free.clearance.is_none());
+}
+
+#[test]
+fn regress_a_collision_that_cannot_be_avoided_is_refused() {
+    // A post through the first link at rest, wherever it turns: it stands on its axis.
+    let robot = planar(
+        "obstacles: [(from: (0, 0, -1), to: (0, 0, 1), radius: 0.1)], may_touch: [(\"base\", \"link1\")],",
+    );
+    // The second link reaches the axis only when folded: that can be avoided, and is.
+    let clearance = Clearance::new(&robot, 0.02).unwrap().unwrap();
+    assert_eq!(clearance.n_pairs(), 1);
+    let (model, limits) = (Model::new(&robot), Limits::from_robot(&robot).unwrap());
+    let found = optimise_fourier(&model, &columns(), &limits, &options(&robot)).unwrap();
+    assert!(found.clearance.unwrap().bound >= 0.02);
+    // The ground above all of the arm: it cannot.
+    let buried = planar("ground: 2,");
+    let refused = optimise_fourier(&model, &columns(), &limits, &options(&buried));
+    assert!(
+        matches!(refused, Err(Error::NoFeasibleMotion { .. })),
+        "{refused:?}"
+    );
+}
+
+#[test]
+fn identity_rates_bound_every_change_of_distance() {
+    let robot = robot_from_ron(idim_fixtures::ARM7).unwrap();
+    let clearance = Clearance::new(&robot, 0.0).unwrap().unwrap();
+    assert!(clearance.n_pairs() > 10);
+    for k in 0..50 {
+        let states = random_states(&robot, 2, k);
+        let at = |q: &[f64]| {
+            let state = JointState {
+                q: q.to_vec(),
+                qd: vec![0.0; 7],
+                qdd: vec![0.0; 7],
+            };
+            clearance.nearest(&JointStates::from_states(&[state]))[0].1
+        };
+        let (from, to) = (states.state(0).q, states.state(1).q);
+        // No point of the arm is further than 1.2 m from any axis before it.
+        let way: f64 = from.iter().zip(&to).map(|(a, b)| (a - b).abs()).sum();
+        assert!((at(&from) - at(&to)).abs() <= 2.0 * 1.2 * way);
+    }
+}
+
+#[test]
+fn regress_questions_without_an_answer_are_refused() {
+    let robot = planar(POST);
+    let refused = |e: Result<TorquePrior, Error>| assert!(matches!(e, Err(Error::Input { .. })));
+    refused(TorquePrior::new(&robot, 0.0));
+    refused(TorquePrior::new(&robot, 1.5));
+    // Coulomb friction as large as what is allowed.
+    refused(TorquePrior::new(&robot, 0.01));
+    refused(TorquePrior::new(
+        &robot_from_ron(idim_fixtures::PUMA3R).unwrap(),
+        0.8,
+    ));
+    assert!(Clearance::new(&robot, -1.0).is_err());
+    let bare = robot_from_ron(idim_fixtures::PUMA3R).unwrap();
+    assert_eq!(Clearance::new(&bare, 0.02).unwrap(), None);
+    let _ = DriveColumns::NONE;
+}
