@@ -3,8 +3,7 @@
 
 use idim_excitation::{Clearance, Error, FourierOptions, TorquePrior, optimise_fourier};
 use idim_model::{
-    Columns, DriveColumns, JointState, JointStates, Model, Robot, inverse_dynamics, random_states,
-    robot_from_ron,
+    Columns, JointState, JointStates, Model, Robot, inverse_dynamics, random_states, robot_from_ron,
 };
 use idim_trajectory::Limits;
 
@@ -169,5 +168,4 @@ fn regress_questions_without_an_answer_are_refused() {
     assert!(Clearance::new(&robot, -1.0).is_err());
     let bare = robot_from_ron(idim_fixtures::PUMA3R).unwrap();
     assert_eq!(Clearance::new(&bare, 0.02).unwrap(), None);
-    let _ = DriveColumns::NONE;
 }

@@ -2,6 +2,7 @@
 
 use crate::check::{CheckArgs, Waiver, run_check};
 use crate::error::Error;
+use crate::excite::{ExciteArgs, run_excite};
 use crate::export::exports;
 use crate::identify::{IdentifyOptions, identify};
 use crate::load::{Changes, LoadedRobot, load_robot};
@@ -32,6 +33,8 @@ pub enum Command {
     Reduce(ReduceArgs),
     /// Write the log that a robot with known inertia would leave behind.
     Simulate(SimulateArgs),
+    /// Design the motion that reveals most, inside all limits.
+    Excite(ExciteArgs),
 }
 
 /// A paper idim reproduces.
@@ -132,6 +135,7 @@ pub fn run(command: &Command, out: &mut dyn Write) -> Result<(), Error> {
         Command::Check(args) => run_check(args, out),
         Command::Reduce(args) => run_reduce(args, out),
         Command::Simulate(args) => run_simulate(args, out),
+        Command::Excite(args) => run_excite(args, out),
     }
 }
 
@@ -308,7 +312,7 @@ pub(crate) fn say(out: &mut dyn Write, text: &str) -> Result<(), Error> {
         })
 }
 
-fn drive_columns(chosen: Option<&[Column]>) -> DriveColumns {
+pub(crate) fn drive_columns(chosen: Option<&[Column]>) -> DriveColumns {
     let Some(chosen) = chosen else {
         return DriveColumns::ALL;
     };

@@ -7,6 +7,7 @@ pub mod cli;
 pub mod crs_a460;
 mod design;
 mod error;
+pub mod excite;
 pub mod export;
 mod identify;
 mod load;

@@ -1,0 +1,188 @@
+//! Designing a motion for a robot: what to ask for, and everything that was found.
+
+mod arguments;
+mod certificate_file;
+mod conditions;
+mod interrupt;
+mod limits;
+mod prior;
+mod text;
+
+pub(crate) use arguments::run_excite;
+pub use arguments::{CriterionTerm, ExciteArgs};
+
+use crate::error::Error;
+use crate::progress::Progress;
+use crate::structure::{KeepOrder, Structure};
+use idim_excitation::{
+    Clearance, Conditioning, Criterion, FourierDesign, FourierEnds, FourierOptions, FourierWatch,
+    TorquePrior, best_random_fourier, optimise_fourier_watched, weighted_conditioning,
+};
+use idim_measurement::Measurements;
+use idim_model::{DriveColumns, Model, Robot};
+use idim_trajectory::{FourierSeries, Limits};
+use interrupt::{Stopped, watched};
+
+/// Random motions a found one is shown beside.
+pub const N_RANDOM: usize = 1000;
+/// Samples of a period the criterion looks at, a harmonic: products of three harmonics stay resolved.
+const SAMPLES_PER_HARMONIC: usize = 20;
+/// Rounds of searches where nothing is said.
+const ROUNDS: usize = 2;
+
+/// What a motion is asked to be.
+#[derive(Debug, Clone)]
+pub struct ExciteOptions {
+    /// Criteria with their weights; the first one's is above zero.
+    pub criteria: Vec<(f64, Criterion)>,
+    /// Period, s.
+    pub period: f64,
+    /// Harmonics of every joint.
+    pub n_harmonics: usize,
+    /// Searches of a round.
+    pub n_starts: usize,
+    /// Rounds after the first; `None`: two, or as many as the time budget allows.
+    pub n_rounds: Option<usize>,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Begin and end at rest.
+    pub at_rest: bool,
+    /// Drive columns beside the inertial ones.
+    pub columns: DriveColumns,
+    /// Standard deviation of each joint's torque, N·m; empty: all alike.
+    pub torque_noise: Vec<f64>,
+    /// Torque limits to keep, and what they are predicted from.
+    pub torque: Option<TorquePrior>,
+    /// Distances to keep.
+    pub clearance: Option<Clearance>,
+    /// Time the search may take, s.
+    pub time_budget: Option<f64>,
+}
+
+/// A motion with everything that is said of it.
+#[derive(Debug, Clone)]
+pub struct Excitation {
+    /// What was asked for.
+    pub options: ExciteOptions,
+    /// The columns it is to tell apart.
+    pub structure: Structure,
+    /// Inside these.
+    pub limits: Limits,
+    /// The motion.
+    pub design: FourierDesign,
+    /// Best of [`N_RANDOM`] random motions by the same criterion; `None` where none could be certified.
+    pub random: Option<FourierDesign>,
+    /// Criteria of the rows divided by the noise, of the motion and of the random one, where noise was given.
+    pub weighted: Option<(Conditioning, Option<Conditioning>)>,
+    /// Logs whose information counted.
+    pub n_logs: usize,
+    pub(crate) stopped: Stopped,
+}
+
+impl Excitation {
+    /// Best value of the criterion asked for, earlier logs included; of a weighted sum: of the logarithms.
+    pub fn value(&self) -> f64 {
+        lowest(&self.design)
+    }
+}
+
+/// Best value among the searches of a design.
+fn lowest(design: &FourierDesign) -> f64 {
+    design.values.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+/// Designs the most revealing motion of a robot inside its limits, beside what `logs` already tell.
+///
+/// Same motion for the same seed and options, whatever the number of threads, unless there is a time budget or somebody
+/// interrupts it: then the best so far is returned.
+///
+/// # Errors
+/// An ambiguous structure, options that make no sense, limits that leave no room.
+pub fn excite(
+    robot: &Robot,
+    limits: &Limits,
+    logs: &[Measurements],
+    options: &ExciteOptions,
+    progress: &Progress,
+) -> Result<Excitation, Error> {
+    let structure = Structure::of_torque(robot, options.columns, KeepOrder::Links).decided()?;
+    let columns = structure.base_columns();
+    let model = Model::new(robot);
+    let mut fourier = fourier_options(options);
+    if !logs.is_empty() {
+        progress.stage("what the logs already tell");
+        fourier.prior_information = Some(prior::information(robot, &columns, logs, options)?);
+    }
+    progress.stage(format!("{N_RANDOM} random motions to compare with"));
+    let random = best_random_fourier(&model, &columns, limits, &fourier, N_RANDOM).ok();
+    fourier
+        .starts
+        .extend(random.iter().map(|r| r.series.clone()));
+    let n_searches = fourier.n_starts;
+    let report = |p: &idim_excitation::FourierProgress| {
+        progress.stage(format!(
+            "searching, round {} of {n_searches} starts: best {:.5}; Ctrl-C takes it",
+            p.round + 1,
+            p.best
+        ));
+    };
+    progress.stage(format!("searching from {n_searches} starts"));
+    let (found, stopped) = watched(options.time_budget, |stop| {
+        let watch = FourierWatch {
+            stop,
+            progress: &report,
+        };
+        optimise_fourier_watched(&model, &columns, limits, &fourier, &watch)
+    });
+    let design = found?;
+    let weigh = |series: &FourierSeries| {
+        let n_samples = 10 * fourier.n_samples;
+        weighted_conditioning(&model, &columns, series, n_samples, &options.torque_noise)
+    };
+    let weighted = (!options.torque_noise.is_empty()).then(|| {
+        let random = random.as_ref().map(|r| weigh(&r.series));
+        (weigh(&design.series), random)
+    });
+    Ok(Excitation {
+        options: options.clone(),
+        structure,
+        limits: limits.clone(),
+        design,
+        random,
+        weighted,
+        n_logs: logs.len(),
+        stopped,
+    })
+}
+
+fn fourier_options(options: &ExciteOptions) -> FourierOptions {
+    let (first, criterion) = options.criteria[0];
+    let further = options.criteria[1..].iter();
+    FourierOptions {
+        period: options.period,
+        n_harmonics: options.n_harmonics,
+        n_samples: FourierOptions::default()
+            .n_samples
+            .max(SAMPLES_PER_HARMONIC * options.n_harmonics),
+        criterion,
+        further: further.map(|&(w, c)| (w / first, c)).collect(),
+        ends: if options.at_rest {
+            FourierEnds::AtRest
+        } else {
+            FourierEnds::Free
+        },
+        torque_noise: options.torque_noise.clone(),
+        torque: options.torque.clone(),
+        clearance: options.clearance.clone(),
+        n_starts: options.n_starts,
+        n_rounds: options.n_rounds.unwrap_or(match options.time_budget {
+            Some(_) => usize::MAX - 1,
+            None => ROUNDS,
+        }),
+        seed: options.seed,
+        n_constraint_samples: FourierOptions::default()
+            .n_constraint_samples
+            .max(6 * options.n_harmonics),
+        ..FourierOptions::default()
+    }
+}

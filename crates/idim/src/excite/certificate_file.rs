@@ -1,0 +1,84 @@
+//! `certificate.json`: what a motion uses of its limits, and every criterion; `docs/excite.md` explains it.
+
+use super::Excitation;
+use super::interrupt::Stopped;
+use super::text::criterion_name;
+use idim_excitation::{Conditioning, FourierDesign};
+use idim_model::Robot;
+use idim_trajectory::LimitUse;
+use serde_json::{Value, json};
+
+/// Schema of the file written here.
+const SCHEMA: &str = "idim-certificate/1";
+
+pub(super) fn certificate_json(robot: &Robot, found: &Excitation) -> Value {
+    let (o, d) = (&found.options, &found.design);
+    let used = |u: &LimitUse, limit: Value| json!({ "limit": limit, "use": u.fraction, "bound": u.bound, "time": u.time });
+    let limits = &found.limits;
+    let joints = robot.joints().iter().zip(&d.certificate.joints).enumerate();
+    let joints: Vec<Value> = joints
+        .map(|(j, (joint, u))| {
+            json!({
+                "joint": joint.name,
+                "position": used(&u.position, json!(limits.position[j])),
+                "velocity": used(&u.velocity, json!(limits.velocity[j])),
+                "acceleration": used(&u.acceleration, json!(limits.acceleration[j])),
+                "torque": d.torque.as_ref().and_then(|t| t.joints[j].as_ref())
+                    .map(|u| used(u, json!(joint.limits.torque))),
+            })
+        })
+        .collect();
+    let (joint, kind, most) = d.certificate.largest();
+    json!({
+        "schema": SCHEMA,
+        "version": env!("CARGO_PKG_VERSION"),
+        "robot": robot.name(),
+        "period": o.period,
+        "harmonics": o.n_harmonics,
+        "at_rest": o.at_rest,
+        "base_parameters": found.structure.base_names(),
+        "certified": d.certificate.certified,
+        "largest_use": {
+            "joint": robot.joints()[joint].name,
+            "limit": format!("{kind:?}").to_lowercase(),
+            "use": most.fraction,
+            "bound": most.bound,
+            "time": most.time,
+        },
+        "joints": joints,
+        "torque_share": d.torque.as_ref().map(|t| t.share),
+        "clearance": d.clearance.as_ref().map(|c| json!({
+            "distance": c.distance,
+            "bound": c.bound,
+            "time": c.time,
+            "links": c.links,
+            "pairs": c.n_pairs,
+        })),
+        "search": {
+            "criterion": criterion_name(found),
+            "value": found.value(),
+            "best_random": found.random.as_ref().map(super::lowest),
+            "seed": o.seed,
+            "starts": o.n_starts,
+            "complete_rounds": d.n_rounds,
+            "searches": d.values.len(),
+            "evaluations": d.n_evaluations,
+            "earlier_logs": found.n_logs,
+            "time_budget": o.time_budget,
+            "reproducible": found.stopped == Stopped::No,
+        },
+        "criteria": criteria(&d.conditioning),
+        "criteria_weighted": found.weighted.as_ref().map(|w| criteria(&w.0)),
+        "criteria_random": found.random.as_ref().map(|r: &FourierDesign| criteria(&r.conditioning)),
+    })
+}
+
+fn criteria(c: &Conditioning) -> Value {
+    json!({
+        "condition_number": { "raw": c.raw.two_norm, "equilibrated": c.equilibrated.two_norm },
+        "frobenius_of_information": { "raw": c.raw.frobenius, "equilibrated": c.equilibrated.frobenius },
+        "log_det": c.log_det,
+        "trace_inverse": c.trace_inverse,
+        "smallest_singular_value": c.smallest_singular_value,
+    })
+}

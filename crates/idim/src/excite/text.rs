@@ -1,0 +1,188 @@
+//! What a person reads of a design.
+
+use super::Excitation;
+use super::arguments::CRITERIA;
+use super::interrupt::Stopped;
+use crate::table::{number, table};
+use idim_excitation::{Conditioning, FourierDesign};
+use idim_model::Robot;
+use idim_trajectory::{JointUse, LimitUse};
+use std::fmt::Write as _;
+
+pub(super) fn excitation_text(robot: &Robot, found: &Excitation) -> String {
+    let o = &found.options;
+    let mut out = format!(
+        "{}: a motion for {} base parameters; {} harmonics over {} s{}\n",
+        robot.name(),
+        found.structure.reduction.rank(),
+        o.n_harmonics,
+        o.period,
+        if o.at_rest { ", from rest to rest" } else { "" },
+    );
+    if found.n_logs > 0 {
+        let _ = writeln!(
+            out,
+            "beside what {} earlier logs tell: information of their time over that of one period",
+            found.n_logs
+        );
+    }
+    out += &search_text(found);
+    let _ = writeln!(
+        out,
+        "lowered: {}; reached {}, best of {} random motions {}",
+        criterion_name(found),
+        number(found.value()),
+        super::N_RANDOM,
+        found.random.as_ref().map_or_else(
+            || "none inside the limits".into(),
+            |r| number(super::lowest(r))
+        ),
+    );
+    out + &criteria_text(found) + &limits_text(robot, found)
+}
+
+/// The criterion in the words of the command line.
+pub(super) fn criterion_name(found: &Excitation) -> String {
+    let terms = &found.options.criteria;
+    let name = |criterion| {
+        CRITERIA
+            .iter()
+            .find(|c| c.1 == criterion)
+            .map_or("?", |c| c.0)
+    };
+    if let [(_, criterion)] = terms[..] {
+        return name(criterion).into();
+    }
+    let parts = terms.iter().map(|(w, c)| format!("{w} log {}", name(*c)));
+    parts.collect::<Vec<_>>().join(" + ")
+}
+
+fn search_text(found: &Excitation) -> String {
+    let d = &found.design;
+    let (n_starts, n_searches) = (found.options.n_starts, d.values.len());
+    let effort = format!(
+        "{n_searches} searches ({} complete rounds of {n_starts}), {} evaluations, seed {}",
+        d.n_rounds, d.n_evaluations, found.options.seed
+    );
+    match found.stopped {
+        Stopped::No => format!("{effort}\n"),
+        Stopped::OutOfTime => format!(
+            "{effort}, as many as the time budget allowed: another machine may find another motion\n"
+        ),
+        Stopped::Interrupted => format!("{effort}, interrupted: the best so far\n"),
+    }
+}
+
+fn criteria_text(found: &Excitation) -> String {
+    let plain = |d: &FourierDesign| d.conditioning;
+    let random = found.random.as_ref().map(plain);
+    let mut rows = rows_of("raw", &found.design.conditioning, random.as_ref(), true);
+    if let Some((weighted, random)) = &found.weighted {
+        rows.extend(rows_of("weighted", weighted, random.as_ref(), false));
+    }
+    let header = [
+        "criterion",
+        "this motion",
+        "best random",
+        "ratio (log: gain)",
+    ];
+    format!("\nCriteria of this motion alone\n{}", table(header, rows))
+}
+
+type Pick = fn(&Conditioning) -> f64;
+
+fn rows_of(
+    word: &str,
+    found: &Conditioning,
+    random: Option<&Conditioning>,
+    equilibrated: bool,
+) -> Vec<[String; 4]> {
+    let mut picks: Vec<(String, Pick, bool)> = vec![
+        (format!("Cond, {word}"), |c| c.raw.two_norm, false),
+        (format!("Frobenius, {word}"), |c| c.raw.frobenius, false),
+    ];
+    if equilibrated {
+        picks.push((
+            "Cond, equilibrated".into(),
+            |c| c.equilibrated.two_norm,
+            false,
+        ));
+        picks.push((
+            "Frobenius, equilibrated".into(),
+            |c| c.equilibrated.frobenius,
+            false,
+        ));
+    }
+    picks.push((format!("D: log det F, {word}"), |c| c.log_det, true));
+    picks.push((
+        format!("A: trace of F^-1, {word}"),
+        |c| c.trace_inverse,
+        false,
+    ));
+    picks.push((
+        format!("E: 1 / smallest singular value, {word}"),
+        |c| 1.0 / c.smallest_singular_value,
+        false,
+    ));
+    let cells = |(name, pick, logarithm): (String, Pick, bool)| {
+        let here = pick(found);
+        let there = random.map(pick);
+        let ratio = there.map(|t| {
+            if logarithm {
+                format!("{:+.2}", here - t)
+            } else {
+                format!("{:.3}", here / t)
+            }
+        });
+        [
+            name,
+            number(here),
+            there.map_or_else(|| "-".into(), number),
+            ratio.unwrap_or_else(|| "-".into()),
+        ]
+    };
+    picks.into_iter().map(cells).collect()
+}
+
+fn limits_text(robot: &Robot, found: &Excitation) -> String {
+    let certificate = &found.design.certificate;
+    let cell = |u: &LimitUse| format!("{:.2} % at {:.2}", 100.0 * u.bound, u.time);
+    let torque = |j: usize| {
+        let of_joint = found.design.torque.as_ref()?.joints[j];
+        of_joint.as_ref().map(cell)
+    };
+    let joints = robot.joints().iter().zip(&certificate.joints).enumerate();
+    let rows = joints.map(|(j, (joint, used)): (usize, (_, &JointUse))| {
+        [
+            joint.name.clone(),
+            cell(&used.position),
+            cell(&used.velocity),
+            cell(&used.acceleration),
+            torque(j).unwrap_or_else(|| "-".into()),
+        ]
+    });
+    let (joint, kind, most) = certificate.largest();
+    let header = ["joint", "position", "velocity", "acceleration", "torque"];
+    let mut out = format!(
+        "\nLargest use of each limit, and when (s): certified for every instant\n{}most used: {kind:?} of joint {}, {:.3} % at {:.3} s\n",
+        table(header, rows),
+        robot.joints()[joint].name,
+        100.0 * most.bound,
+        most.time,
+    );
+    if let Some(torque) = &found.design.torque {
+        let _ = writeln!(
+            out,
+            "torques: by the inertial values of the robot file, at most {} % of each limit",
+            100.0 * torque.share
+        );
+    }
+    if let Some(c) = &found.design.clearance {
+        let _ = writeln!(
+            out,
+            "clearance: {:.4} m between {} and {} at {:.2} s, never below {:.4} m ({} pairs)",
+            c.distance, c.links[0], c.links[1], c.time, c.bound, c.n_pairs
+        );
+    }
+    out
+}

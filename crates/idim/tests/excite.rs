@@ -1,0 +1,215 @@
+//! `idim excite` from the command line to the files it leaves, and what it refuses.
+#![allow(clippy::unwrap_used)]
+
+use clap::Parser;
+use idim_trajectory::{FourierSeries, Limits, Motion, TrajectoryFile};
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+#[derive(Parser)]
+struct Arguments {
+    #[command(subcommand)]
+    command: idim::cli::Command,
+}
+
+fn run(arguments: &[&str]) -> Result<String, String> {
+    let parsed = Arguments::try_parse_from(["idim", "excite"].iter().chain(arguments))
+        .map_err(|e| e.to_string())?;
+    let mut out = Vec::new();
+    idim::cli::run(&parsed.command, &mut out).map_err(|e| e.to_string())?;
+    Ok(String::from_utf8(out).unwrap())
+}
+
+/// A folder with an upright arm of two links.
+struct Bench(tempfile::TempDir);
+
+const LIMITS: [&str; 6] = [
+    "--position",
+    "1.2",
+    "--velocity",
+    "2,3",
+    "--acceleration",
+    "8",
+];
+/// A second of work at most.
+const SMALL: [&str; 8] = [
+    "--harmonics",
+    "3",
+    "--period",
+    "6",
+    "--starts",
+    "2",
+    "--rounds",
+    "1",
+];
+
+impl Bench {
+    fn new() -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("arm.ron"), idim_fixtures::PLANAR2R).unwrap();
+        Self(dir)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn excite(&self, out: &str, more: &[&str]) -> Result<String, String> {
+        let (robot, out) = (self.path("arm.ron"), self.path(out));
+        let mut arguments = vec!["--robot", robot.to_str().unwrap()];
+        arguments.extend(["--out", out.to_str().unwrap()]);
+        arguments.extend(SMALL);
+        arguments.extend(more);
+        run(&arguments)
+    }
+
+    fn file(&self, out: &str, name: &str) -> String {
+        let robot = std::fs::read_dir(self.path(out))
+            .unwrap()
+            .next()
+            .unwrap()
+            .unwrap();
+        std::fs::read_to_string(robot.path().join(name)).unwrap()
+    }
+
+    fn series(&self, out: &str) -> FourierSeries {
+        let file = TrajectoryFile::from_ron(&self.file(out, "motion.ron")).unwrap();
+        let Motion::Fourier(series) = file.motion().unwrap() else {
+            panic!("not a Fourier motion")
+        };
+        series
+    }
+}
+
+#[test]
+fn regress_a_motion_with_its_files_comes_out_certified() {
+    let bench = Bench::new();
+    let text = bench.excite("out", &LIMITS).unwrap();
+    for word in [
+        "Cond, raw",
+        "Cond, equilibrated",
+        "log det F",
+        "best random",
+        "most used",
+    ] {
+        assert!(text.contains(word), "`{word}` is not in: {text}");
+    }
+    let series = bench.series("out");
+    let json = TrajectoryFile::from_json(&bench.file("out", "motion.json")).unwrap();
+    assert_eq!(json.motion().unwrap(), Motion::Fourier(series.clone()));
+    let limits = Limits::new(vec![[-1.2, 1.2]; 2], vec![2.0, 3.0], vec![8.0; 2]).unwrap();
+    assert!(series.certificate(&limits).certified);
+    // The samples are those of the motion, both ends included.
+    let csv = bench.file("out", "samples.csv");
+    let lines: Vec<&str> = csv.lines().collect();
+    assert_eq!(lines[0], "t,q1,q2,qd1,qd2,qdd1,qdd2");
+    assert_eq!(lines.len(), 1 + 601);
+    let row: Vec<f64> = lines[124].split(',').map(|v| v.parse().unwrap()).collect();
+    let state = series.states(&[1.23]).state(0);
+    assert_eq!(row[0], 1.23);
+    assert_eq!(&row[1..], &[state.q, state.qd, state.qdd].concat());
+    let certificate: serde_json::Value =
+        serde_json::from_str(&bench.file("out", "certificate.json")).unwrap();
+    assert_eq!(certificate["certified"], true);
+    assert_eq!(certificate["search"]["reproducible"], true);
+    assert_eq!(certificate["joints"][1]["velocity"]["limit"], 3.0);
+    let most = certificate["largest_use"]["use"].as_f64().unwrap();
+    assert!((0.99..=1.0).contains(&most), "{most}");
+    assert!(bench.file("out", "motion.svg").starts_with("<svg"));
+    // Better than chance, and the same again.
+    let search = &certificate["search"];
+    assert!(search["value"].as_f64().unwrap() < search["best_random"].as_f64().unwrap());
+    bench.excite("again", &LIMITS).unwrap();
+    assert_eq!(bench.series("again"), series);
+}
+
+#[test]
+fn regress_rest_weights_and_a_time_budget_are_heard() {
+    let bench = Bench::new();
+    let more = [
+        "--rest",
+        "--noise",
+        "0.1,0.5",
+        "--criterion",
+        "d,cond-equilibrated=0.5",
+    ];
+    let budget = ["--time-budget", "0.2", "--columns", "viscous"];
+    let text = bench
+        .excite("out", &[&LIMITS[..], &more, &budget].concat())
+        .unwrap();
+    assert!(
+        text.contains("1 log d + 0.5 log cond-equilibrated"),
+        "{text}"
+    );
+    assert!(text.contains("Cond, weighted"), "{text}");
+    assert!(text.contains("from rest to rest"), "{text}");
+    let start = bench.series("out").states(&[0.0]).state(0);
+    assert!(start.qd.iter().chain(&start.qdd).all(|v| v.abs() < 1e-10));
+    // `--rounds` given and done long before the budget: nothing was cut short, or the text says so.
+    let certificate = bench.file("out", "certificate.json");
+    let reproducible = certificate.contains("\"reproducible\": true");
+    assert_ne!(reproducible, text.contains("another machine"), "{text}");
+}
+
+/// What the log of two slow sines tells need not be asked again.
+#[test]
+fn identity_earlier_logs_change_what_is_asked_of_the_motion() {
+    let bench = Bench::new();
+    let (mut log, n) = (String::from("t,q1,q2,qd1,qd2,qdd1,qdd2,tau1,tau2\n"), 1000);
+    for k in 0..n {
+        let t = 0.01 * f64::from(k);
+        let joint = |w: f64| {
+            let (s, c) = (w * t).sin_cos();
+            [s, w * c, -w * w * s, 3.0 * w * c - 2.0 * w * w * s]
+        };
+        let (a, b) = (joint(2.0), joint(3.1));
+        let _ = write!(log, "{t}");
+        for (a, b) in a.iter().zip(b) {
+            let _ = write!(log, ",{a},{b}");
+        }
+        log.push('\n');
+    }
+    std::fs::write(bench.path("log.csv"), log).unwrap();
+    let path = bench.path("log.csv");
+    let given = ["--log", path.to_str().unwrap(), "--criterion", "d"];
+    let text = bench
+        .excite("out", &[&LIMITS[..], &given].concat())
+        .unwrap();
+    assert!(text.contains("1 earlier logs"), "{text}");
+    let alone = bench.excite("alone", &[&LIMITS[..], &["--criterion", "d"]].concat());
+    alone.unwrap();
+    assert_ne!(bench.series("out"), bench.series("alone"));
+    // Together they tell more than the motion alone does.
+    let value = |out: &str| -> f64 {
+        let json: serde_json::Value =
+            serde_json::from_str(&bench.file(out, "certificate.json")).unwrap();
+        json["search"]["value"].as_f64().unwrap()
+    };
+    assert!(value("out") < value("alone"));
+}
+
+#[test]
+fn regress_questions_without_an_answer_are_refused_and_nothing_is_written() {
+    let bench = Bench::new();
+    let refused = |more: &[&str], words: &[&str]| {
+        let message = bench.excite("out", more).unwrap_err();
+        for word in words {
+            assert!(message.contains(word), "`{word}` is not in: {message}");
+        }
+        assert!(!bench.path("out").exists(), "{message}");
+    };
+    let with = |more: &[&'static str]| [&LIMITS[..], more].concat();
+    refused(&[], &["no position limit", "--position", "robot-file.md"]);
+    refused(&LIMITS[..4], &["no acceleration limit", "--acceleration"]);
+    refused(
+        &with(&["--criterion", "best"]),
+        &["no criterion `best`", "cond-equilibrated"],
+    );
+    refused(&with(&["--criterion", "cond=-1"]), &["above zero"]);
+    refused(&with(&["--rate", "0"]), &["--rate"]);
+    refused(&with(&["--time-budget", "inf"]), &["--time-budget"]);
+    refused(&with(&["--noise", "1,2,3"]), &["--noise", "3 numbers"]);
+    refused(&with(&["--noise", "0"]), &["above zero"]);
+    refused(&["--velocity", "1,2,3"], &["--velocity", "each of the 2"]);
+    refused(&with(&["--log", "nowhere.csv"]), &["nowhere.csv"]);
+}
