@@ -10,6 +10,10 @@ const PERIOD: f64 = 10.0;
 /// Harmonics of a designed motion, as there.
 const HARMONICS: usize = 5;
 
+/// Searches of a round, and rounds after the first: a few seconds of work.
+const N_STARTS: usize = 8;
+const N_ROUNDS: usize = 3;
+
 /// A motion of small raw condition number, certified within the limits.
 ///
 /// # Errors
@@ -24,8 +28,8 @@ pub(crate) fn motion_for(
         period: PERIOD,
         n_harmonics: HARMONICS,
         criterion: Criterion::TwoNorm(Scaling::Raw),
-        n_starts: 4,
-        n_rounds: 1,
+        n_starts: N_STARTS,
+        n_rounds: N_ROUNDS,
         seed,
         ..FourierOptions::default()
     };

@@ -1,5 +1,6 @@
 //! Gautier & Khalil 1991 in full: base parameters of the energy model, exciting points, the path, the noise study.
 
+mod exact;
 mod tables;
 
 use crate::cli::NamedText;
@@ -129,6 +130,8 @@ pub fn run(seed: u64, progress: &Progress) -> Result<PumaRun, Error> {
         "puma: Powell's method, {ROWS} rows, {STARTS} random starts"
     ));
     let motion = exciting_motion(&robot, &structure, design.limits(), &path_limits, seed)?;
+    progress.stage(format!("puma: exact gradients, {ROWS} rows, many starts"));
+    let exact = exact::exact_searches(&design, ROWS, seed)?;
     progress.stage("puma: what noise does to the estimate");
     let x: Vec<f64> = paper.table5.rows.iter().map(|r| r.value).collect();
     let random = random_of_condition(&design, paper.table3_condition(), seed);
@@ -139,6 +142,7 @@ pub fn run(seed: u64, progress: &Progress) -> Result<PumaRun, Error> {
         structure: &structure,
         table2: &table2,
         motion: &motion,
+        exact: &exact,
         good: &good,
         bad: &bad,
     };

@@ -1,5 +1,6 @@
 //! What the run says: tables for a person, numbers for `result.json`.
 
+use super::exact::{ExactSearches, PRINTED_S};
 use super::{Motion, ROWS, STARTS};
 use crate::noise_study::{NoiseRow, NoiseStudy};
 use crate::papers::{GautierKhalil, NoiseCell, NoiseTableRow};
@@ -18,6 +19,7 @@ pub(super) struct Found<'a> {
     pub(super) structure: &'a Structure,
     pub(super) table2: &'a [ConditionStatistics],
     pub(super) motion: &'a Motion,
+    pub(super) exact: &'a ExactSearches,
     pub(super) good: &'a NoiseStudy,
     pub(super) bad: &'a NoiseStudy,
 }
@@ -32,6 +34,7 @@ pub(super) fn text(found: &Found) -> String {
     );
     out += &table2_text(found);
     out += &motion_text(found.motion);
+    out += &exact_text(found.exact);
     out += &noise_text(
         "Table 3. Noise on Y (medians of 1000 draws)",
         ["||dY||/||Y||", "K_R"],
@@ -119,6 +122,31 @@ fn motion_text(motion: &Motion) -> String {
         100.0 * most.fraction,
         joint + 1,
         most.time,
+    )
+}
+
+fn exact_text(exact: &ExactSearches) -> String {
+    let rows = [("S free", &exact.free), ("S at most 175", &exact.limited)].map(|(what, d)| {
+        [
+            what.to_owned(),
+            number(d.conditioning.raw.two_norm),
+            number(d.conditioning.equilibrated.two_norm),
+            number(d.conditioning.equilibrium.map_or(f64::NAN, |s| s.ratio)),
+            number(d.conditioning.log_det),
+            d.n_evaluations.to_string(),
+        ]
+    });
+    let header = [
+        "",
+        "Cond(W), raw",
+        "equilibrated",
+        "S",
+        "log det(W'W/r)",
+        "evaluations",
+    ];
+    format!(
+        "\nThe same limits and r = {ROWS}, by exact gradients and many starts (not the paper's method)\n{}",
+        table(header, rows)
     )
 }
 
@@ -278,6 +306,19 @@ fn paper_numbers(found: &Found) -> Vec<PaperNumber> {
         Some(11.16),
         c.raw.two_norm,
         "limits inferred; Powell's method",
+    ));
+    let exact = found.exact;
+    numbers.push(PaperNumber::new(
+        "Cond(W), r = 30, exact gradients, S free",
+        Some(11.16),
+        exact.free.conditioning.raw.two_norm,
+        "limits inferred; not the paper's method",
+    ));
+    numbers.push(PaperNumber::new(
+        format!("Cond(W), r = 30, exact gradients, S at most {PRINTED_S}"),
+        Some(11.16),
+        exact.limited.conditioning.raw.two_norm,
+        "limits inferred; not the paper's method",
     ));
     let s = c.equilibrium.map_or(f64::NAN, |s| s.ratio);
     numbers.push(PaperNumber::new(
