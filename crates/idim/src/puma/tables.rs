@@ -307,19 +307,7 @@ fn paper_numbers(found: &Found) -> Vec<PaperNumber> {
         c.raw.two_norm,
         "limits inferred; Powell's method",
     ));
-    let exact = found.exact;
-    numbers.push(PaperNumber::new(
-        "Cond(W), r = 30, exact gradients, S free",
-        Some(11.16),
-        exact.free.conditioning.raw.two_norm,
-        "limits inferred; not the paper's method",
-    ));
-    numbers.push(PaperNumber::new(
-        format!("Cond(W), r = 30, exact gradients, S at most {PRINTED_S}"),
-        Some(11.16),
-        exact.limited.conditioning.raw.two_norm,
-        "limits inferred; not the paper's method",
-    ));
+    numbers.extend(exact_numbers(found.exact));
     let s = c.equilibrium.map_or(f64::NAN, |s| s.ratio);
     numbers.push(PaperNumber::new(
         "S of the optimised sequence",
@@ -347,6 +335,21 @@ fn paper_numbers(found: &Found) -> Vec<PaperNumber> {
         ));
     }
     numbers
+}
+
+fn exact_numbers(exact: &ExactSearches) -> [PaperNumber; 2] {
+    let number = |what: String, design: &idim_excitation::PointDesign| {
+        PaperNumber::new(
+            format!("Cond(W), r = {ROWS}, exact gradients, {what}"),
+            Some(11.16),
+            design.conditioning.raw.two_norm,
+            "limits inferred; not the paper's method",
+        )
+    };
+    [
+        number("S free".into(), &exact.free),
+        number(format!("S at most {PRINTED_S}"), &exact.limited),
+    ]
 }
 
 fn excitation_json(motion: &Motion) -> serde_json::Value {
