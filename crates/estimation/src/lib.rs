@@ -5,6 +5,7 @@
 //!
 //! - [`InformationFactor`] folds rows in; [`solve`] and [`solve_with_known_noise`] read the answer.
 //! - [`weighted_least_squares`] weights the joints by the covariance of their residuals; [`NoiseCovariance`] whitens rows by hand.
+//! - [`partial_least_squares`] does both of a dense `W` some of whose rows are left out, with uncertainty for noise that remembers.
 //! - [`robust_least_squares`] loses outliers, [`essential_parameters`] what the data do not need, [`total_least_squares`] finds drive gains.
 //! - [`physically_consistent`] asks whether real bodies could have the parameters, and which are most plausible.
 //! - [`ResidualStatistics`] says how well a model predicts, joint by joint; [`ljung_box`] whether its residual is white.
@@ -38,6 +39,7 @@ mod essential;
 mod householder;
 mod information;
 mod noise;
+mod partial;
 mod quantile;
 mod rank;
 mod residuals;
@@ -67,6 +69,9 @@ pub use essential::{
 };
 pub use information::{InformationFactor, Parts, factor_of};
 pub use noise::{NoiseCovariance, ResidualCovariance};
+pub use partial::{
+    PartialEstimate, PartialOptions, PartialRows, partial_least_squares, whitened_factor,
+};
 pub use quantile::{chi_square_quantile, f_quantile, student_t_quantile};
 pub use rank::{RANK_TOLERANCE, VANISHING_COLUMN};
 pub use residuals::{JointResidual, ResidualStatistics};
