@@ -1,14 +1,18 @@
 //! The command line, shared by the binary and the workspace's driver.
 
 use crate::check::{CheckArgs, Waiver, run_check};
+use crate::commands::{self, DriveGainsArgs, LoadedRuns, TorqueConstantsArgs};
 use crate::error::Error;
 use crate::excite::{ExciteArgs, run_excite};
 use crate::export::exports;
+use crate::fit::EstimationOptions;
+use crate::friction::parse_friction;
 use crate::identify::{IdentifyOptions, identify};
 use crate::load::{Changes, LoadedRobot, load_robot};
 use crate::log_spec::LogSpec;
 use crate::logs::{read_logs, read_mapping};
 use crate::output::write_atomically;
+use crate::plan::SamplingOptions;
 use crate::progress::Progress;
 use crate::report::{identification_text, paper_text, reduction_text, warnings_text};
 use crate::report_html::{file_settings, page_of_logs, shell_line};
@@ -17,6 +21,7 @@ use crate::simulated_log::{SimulateArgs, run_simulate};
 use crate::structure::{KeepOrder, Structure};
 use crate::{crs_a460, plots, puma};
 use clap::{Args, Subcommand, ValueEnum};
+use idim_estimation::{HUBER_K, RobustLoss, TUKEY_C, Weighting};
 use idim_model::DriveColumns;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -35,6 +40,12 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Design the motion that reveals most, inside all limits.
     Excite(ExciteArgs),
+    /// Find the load on an arm from runs without and with it.
+    Payload(LoadedRuns),
+    /// Find what each drive's signal is worth, from runs without and with a load of known mass.
+    DriveGains(DriveGainsArgs),
+    /// Find motors' torque constants from back-EMF: speed and open-terminal voltage.
+    TorqueConstants(TorqueConstantsArgs),
 }
 
 /// A paper idim reproduces.
@@ -106,6 +117,48 @@ pub struct IdentifyArgs {
     /// Take q, qd, qdd and torque as they are: no filter, no differentiation, no decimation.
     #[arg(long)]
     pub as_recorded: bool,
+    /// Low-pass of positions and velocities, Hz (default: from the motion's bandwidth).
+    #[arg(long, value_name = "HZ", value_parser = parse_positive)]
+    pub cutoff: Option<f64>,
+    /// Rows a second after the parallel decimation, Hz (default: from the cutoff).
+    #[arg(long, value_name = "HZ", value_parser = parse_positive)]
+    pub rate: Option<f64>,
+    /// Differentiate positions though velocities are recorded.
+    #[arg(long)]
+    pub derive_velocity: bool,
+    /// Leave out the rows of a joint slower than this, rad/s (m/s): one number, or one a joint.
+    #[arg(long, value_name = "SPEED", value_delimiter = ',', value_parser = parse_positive)]
+    pub dead_band: Vec<f64>,
+    /// Friction terms: auto, or [JOINT=]viscous,coulomb,offset,asymmetric,cubic,root,stribeck[:SPEED],load,tanh:SPEED; may be repeated.
+    #[arg(long, value_name = "TERMS")]
+    pub friction: Vec<String>,
+    /// Weights: the joints' full residual covariance, or one variance a joint.
+    #[arg(long, value_enum, default_value_t = WeightingChoice::Full)]
+    pub weighting: WeightingChoice,
+    /// Take the say from outliers: contacts, stops, dropped packets.
+    #[arg(long, value_enum)]
+    pub robust: Option<RobustChoice>,
+    /// Keep only the parameters that the residual would miss; the others are listed with their interval.
+    #[arg(long)]
+    pub essential: bool,
+}
+
+/// Which part of the residual covariance weights the rows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum WeightingChoice {
+    /// Variances and correlations between the joints.
+    Full,
+    /// One variance a joint.
+    Diagonal,
+}
+
+/// A loss that outliers lose their say by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RobustChoice {
+    /// Convex: an outlier keeps a limited pull.
+    Huber,
+    /// An outlier vanishes.
+    Tukey,
 }
 
 /// Arguments of `reduce`.
@@ -136,6 +189,9 @@ pub fn run(command: &Command, out: &mut dyn Write) -> Result<(), Error> {
         Command::Reduce(args) => run_reduce(args, out),
         Command::Simulate(args) => run_simulate(args, out),
         Command::Excite(args) => run_excite(args, out),
+        Command::Payload(args) => commands::payload(args, out),
+        Command::DriveGains(args) => commands::run_drive_gains(args, out),
+        Command::TorqueConstants(args) => commands::torque_constants(args, out),
     }
 }
 
@@ -186,7 +242,18 @@ fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<()
     let validation = read_logs(&args.validate, &loaded, &mapping, &args.waive)?;
     let options = IdentifyOptions {
         columns: drive_columns(args.columns.as_deref()),
-        as_recorded: args.as_recorded,
+        sampling: SamplingOptions {
+            as_recorded: args.as_recorded,
+            cutoff: args.cutoff,
+            rate: args.rate,
+            derive_velocity: args.derive_velocity,
+            dead_band: args.dead_band.clone(),
+        },
+        friction: parse_friction(&args.friction).map_err(|met| {
+            let rule = "write --friction auto, or --friction [JOINT=]TERM,TERM,..";
+            Error::input("--friction", met, rule)
+        })?,
+        estimation: estimation_options(args),
         seed: args.seed,
     };
     progress.stage("identifying");
@@ -321,6 +388,29 @@ pub(crate) fn drive_columns(chosen: Option<&[Column]>) -> DriveColumns {
         viscous: chosen.contains(&Column::Viscous),
         coulomb: chosen.contains(&Column::Coulomb),
         offset: chosen.contains(&Column::Offset),
+    }
+}
+
+fn estimation_options(args: &IdentifyArgs) -> EstimationOptions {
+    EstimationOptions {
+        weighting: match args.weighting {
+            WeightingChoice::Full => Weighting::Full,
+            WeightingChoice::Diagonal => Weighting::Diagonal,
+        },
+        robust: args.robust.map(|r| match r {
+            RobustChoice::Huber => RobustLoss::Huber { k: HUBER_K },
+            RobustChoice::Tukey => RobustLoss::Tukey { c: TUKEY_C },
+        }),
+        essential: args.essential,
+    }
+}
+
+fn parse_positive(text: &str) -> Result<f64, String> {
+    let number: f64 = text.trim().parse().unwrap_or(f64::NAN);
+    if number > 0.0 && number.is_finite() {
+        Ok(number)
+    } else {
+        Err(format!("`{text}` is not a number above zero"))
     }
 }
 

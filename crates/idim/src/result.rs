@@ -9,7 +9,7 @@ use serde::Serialize;
 pub const SCHEMA: &str = "idim-result/1";
 
 /// Everything one run found.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct IdentificationResult {
     /// [`SCHEMA`].
     pub schema: &'static str,
@@ -30,6 +30,15 @@ pub struct IdentificationResult {
     /// Errors on data held out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub validation: Option<ErrorResult>,
+    /// Errors on data held out, torques filtered and decimated as the fit has them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub validation_in_band: Option<ErrorResult>,
+    /// Errors of simpler models on the data held out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub baselines: Vec<BaselineResult>,
+    /// Friction terms tried on each joint.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub friction: Vec<FrictionResult>,
     /// The motion and what it reveals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excitation: Option<serde_json::Value>,
@@ -50,7 +59,7 @@ pub struct IdentificationResult {
 }
 
 /// Categories of the parameters.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct ReductionResult {
     /// All columns.
     pub standard: Vec<String>,
@@ -76,7 +85,7 @@ pub struct BaseParameter {
 }
 
 /// The estimate.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct EstimateResult {
     /// How it was made.
     pub method: String,
@@ -84,6 +93,12 @@ pub struct EstimateResult {
     pub parameters: Vec<ParameterResult>,
     /// Of the rows the estimate was made from.
     pub condition_number: ConditionResult,
+    /// Parameters that the residual does not miss: left out, not zero.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub dropped: Vec<DroppedResult>,
+    /// Spans of time that a robust fit took the say from.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub down_weighted: Vec<DownWeightedResult>,
 }
 
 /// One parameter.
@@ -130,6 +145,69 @@ pub struct JointError {
     pub relative_error: f64,
     /// `1 - Σ(τ - τ̂)² / Σ(τ - mean τ)²`.
     pub r2: f64,
+    /// Largest size of the residual, N·m.
+    pub largest: f64,
+}
+
+/// A parameter left out of an essential fit.
+#[derive(Debug, Clone, Serialize)]
+pub struct DroppedResult {
+    /// Name of the base parameter.
+    pub name: String,
+    /// Its value in the full fit.
+    pub value: f64,
+    /// Lower end of its 95 % interval in the full fit.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Its relative standard deviation when it went; `null` for a value of zero.
+    pub relative_std: Option<f64>,
+}
+
+/// A span of time that lost its say.
+#[derive(Debug, Clone, Serialize)]
+pub struct DownWeightedResult {
+    /// The log.
+    pub log: String,
+    /// First time, s.
+    pub from: f64,
+    /// Last time, s.
+    pub to: f64,
+    /// Joints concerned, counted from 1.
+    pub joints: Vec<usize>,
+    /// Lowest weight within, in [0, 1].
+    pub lowest_weight: f64,
+}
+
+/// A simpler model on the held-out samples.
+#[derive(Debug, Clone, Serialize)]
+pub struct BaselineResult {
+    /// What it is.
+    pub name: String,
+    /// Its errors.
+    pub errors: ErrorResult,
+}
+
+/// The friction of a joint and how it was chosen.
+#[derive(Debug, Clone, Serialize)]
+pub struct FrictionResult {
+    /// Name of the joint.
+    pub joint: String,
+    /// The terms it has.
+    pub chosen: String,
+    /// Everything that was tried, in order.
+    pub tried: Vec<FrictionTrial>,
+}
+
+/// One choice of friction terms of a joint.
+#[derive(Debug, Clone, Serialize)]
+pub struct FrictionTrial {
+    /// The terms.
+    pub terms: String,
+    /// Number of parameters.
+    pub size: usize,
+    /// RMS of the joint's residual on held-out blocks, filtered and decimated as the fit has it, N·m; `null` where not determined.
+    pub held_out_rms: Option<f64>,
 }
 
 /// A printed number and ours.

@@ -1,7 +1,9 @@
 //! Which parameters of a robot the motors can feel at all, and the names people give them.
 
+use crate::columns::{ExtraColumn, ModelColumns, described_extras};
 use crate::error::Error;
 use crate::result::{BaseParameter, ReductionResult};
+use crate::samples::{Stretch, visit_model_rows};
 use idim_base_params::{Reduction, ReductionOptions, TriangularFactor, reduce};
 use idim_model::{
     Columns, DriveColumns, Model, Notation, ParameterKind, Robot, energy_regressor, random_states,
@@ -26,8 +28,10 @@ const STRUCTURE_SEED: u64 = 1991;
 /// The columns of a regressor and what can be told of them.
 #[derive(Debug, Clone)]
 pub struct Structure {
-    /// All columns, in the standard order.
+    /// All columns of the torque regressor, in the standard order.
     pub columns: Columns,
+    /// Columns that coupled motors and known torques add, after the others.
+    pub extra: Vec<ExtraColumn>,
     /// Categories, base columns, regrouping.
     pub reduction: Reduction,
     /// The words the parameters are printed in.
@@ -51,7 +55,27 @@ impl Structure {
                 }
             }
         });
-        Self::from_factor(columns, &factor, order)
+        Self::from_factor(columns, Vec::new(), &factor, order)
+    }
+
+    /// Of the torque model with these columns, and with those that the robot file adds: motors that turn with several
+    /// joints, known torques.
+    pub fn of_drives(robot: &Robot, standard: Columns) -> Self {
+        let columns = ModelColumns {
+            standard,
+            extra: described_extras(robot),
+        };
+        let n_samples = ROWS_PER_COLUMN * columns.len() / robot.n_joints();
+        let stretch = Stretch::of_states(random_states(robot, n_samples, STRUCTURE_SEED));
+        let mut factor = TriangularFactor::new(columns.len());
+        visit_model_rows(robot, &columns, &stretch, &[], |_, _, row| {
+            // A formula without a value at some position says nothing there.
+            if row.iter().all(|v| v.is_finite()) {
+                factor.push_rows(row);
+            }
+        });
+        let ModelColumns { standard, extra } = columns;
+        Self::from_factor(standard, extra, &factor, KeepOrder::Links)
     }
 
     /// Of the energy-difference model of Gautier & Khalil, from random pairs of points.
@@ -71,11 +95,17 @@ impl Structure {
             }
             last = Some(h);
         }
-        Self::from_factor(columns, &factor, order)
+        Self::from_factor(columns, Vec::new(), &factor, order)
     }
 
-    fn from_factor(columns: Columns, factor: &TriangularFactor, order: KeepOrder) -> Self {
-        let positions = keep_positions(&columns, order);
+    fn from_factor(
+        columns: Columns,
+        extra: Vec<ExtraColumn>,
+        factor: &TriangularFactor,
+        order: KeepOrder,
+    ) -> Self {
+        let mut positions = keep_positions(&columns, order);
+        positions.extend(columns.len()..columns.len() + extra.len());
         let reduction = reduce(factor, &positions, &ReductionOptions::default());
         let notation = match order {
             KeepOrder::Links => Notation::Gautier,
@@ -83,6 +113,7 @@ impl Structure {
         };
         Self {
             columns,
+            extra,
             reduction,
             notation,
         }
@@ -127,12 +158,23 @@ impl Structure {
 
     /// Names of all columns.
     pub fn names(&self) -> Vec<String> {
-        self.columns.names(self.notation)
+        let mut names = self.columns.names(self.notation);
+        names.extend(self.extra.iter().map(ExtraColumn::name));
+        names
     }
 
-    /// The kept columns.
+    /// The kept columns of the torque regressor.
     pub fn base_columns(&self) -> Columns {
-        self.columns.select(&self.reduction.base)
+        self.base_model_columns().standard
+    }
+
+    /// The kept columns, with those beside the torque regressor.
+    pub fn base_model_columns(&self) -> ModelColumns {
+        let all = ModelColumns {
+            standard: self.columns.clone(),
+            extra: self.extra.clone(),
+        };
+        all.select(&self.reduction.base)
     }
 
     /// Names of the base parameters, with an R where something is regrouped.

@@ -252,8 +252,12 @@ fn tutorial_arm() -> (Robot, Identification) {
     };
     let options = IdentifyOptions {
         columns,
-        as_recorded: true,
+        sampling: idim::SamplingOptions {
+            as_recorded: true,
+            ..idim::SamplingOptions::default()
+        },
         seed: 1,
+        ..IdentifyOptions::default()
     };
     let found = identify(&loaded, vec![log], Vec::new(), &options).unwrap();
     (robot, found)

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use idim::report_html::{CutoffCurve, ReportData, ReportTable, ReportedFinding, report_html};
-use idim::{Identification, IdentifyOptions, LoadedRobot, identify};
+use idim::{Identification, IdentifyOptions, LoadedRobot, SamplingOptions, identify};
 use idim_measurement::Measurements;
 use idim_model::{DriveColumns, JointState, Model, Robot, inverse_dynamics, robot_from_ron};
 use std::path::{Path, PathBuf};
@@ -79,8 +79,12 @@ fn found(robot: &Robot) -> Identification {
     };
     let options = IdentifyOptions {
         columns: DriveColumns::ALL,
-        as_recorded: true,
+        sampling: SamplingOptions {
+            as_recorded: true,
+            ..SamplingOptions::default()
+        },
         seed: 1,
+        ..IdentifyOptions::default()
     };
     identify(&loaded, vec![log(robot, HOSTILE)], Vec::new(), &options).unwrap()
 }

@@ -203,18 +203,15 @@ pub(super) fn result(
                 equilibrated: Some(base.ordinary.condition_number.equilibrated),
                 weighted: Some(e.condition_number.raw),
             },
+            ..EstimateResult::default()
         }),
-        train: None,
-        validation: None,
         excitation: Some(motions.iter().map(motion_json).collect()),
         paper,
-        inferred: Vec::new(),
-        findings: Vec::new(),
-        conditioning: Vec::new(),
         warnings: vec![
             "The inertial and friction values of the simulated arm are invented; table II of the paper is not realisable and serves as print only.".into(),
             "The paper's 36 identifiable parameters are its base set; 21 of them can be told apart from all others.".into(),
         ],
+        ..IdentificationResult::default()
     }
 }
 

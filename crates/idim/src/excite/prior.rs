@@ -2,7 +2,8 @@
 
 use super::ExciteOptions;
 use crate::error::Error;
-use crate::samples::{SamplingPlan, stretches};
+use crate::plan::{SamplingOptions, SamplingPlan};
+use crate::samples::stretches;
 use faer::Mat;
 use idim_excitation::information_matrix;
 use idim_measurement::Measurements;
@@ -22,7 +23,7 @@ pub(super) fn information(
         options.torque_noise.iter().map(|s| 1.0 / (s * s)).collect()
     };
     let model = Model::new(robot);
-    let plan = SamplingPlan::from_motion(logs);
+    let plan = SamplingPlan::new(logs, &SamplingOptions::default());
     let mut sum = Mat::zeros(columns.len(), columns.len());
     for log in logs {
         for stretch in stretches(log, &plan)? {

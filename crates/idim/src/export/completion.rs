@@ -55,7 +55,7 @@ const ROOM: f64 = 2.0;
 /// Why there is none, in a sentence: no prior, a prior that no rigid body has, data that do not excite every parameter.
 pub fn complete(found: &Identification, robot: &Robot) -> Result<Completion, String> {
     let structure = &found.structure;
-    if found.columns != structure.base_columns() {
+    if found.columns != structure.base_model_columns() || !structure.extra.is_empty() {
         return Err("the log does not excite every base parameter".into());
     }
     let priors = robot.links().iter().map(|l| l.inertial.ok_or(&l.name));

@@ -110,7 +110,7 @@ pub(super) fn parameters_yaml(
 }
 
 fn drive<'a>(found: &Identification, robot: &'a Robot, joint: usize) -> Drive<'a> {
-    let all = found.columns.0.iter().zip(&found.values);
+    let all = found.columns.standard.0.iter().zip(&found.values);
     let value = |kind| {
         let mut own = all
             .clone()

@@ -248,18 +248,14 @@ pub(super) fn result(found: &Found, seed: u64) -> IdentificationResult {
             &structure.base_names(),
             good.condition_number,
         )),
-        train: None,
-        validation: None,
         excitation: Some(excitation_json(found.motion)),
         paper: paper_numbers(found),
-        inferred: Vec::new(),
-        findings: Vec::new(),
-        conditioning: Vec::new(),
         warnings: vec![
             "The paper gives no limits; those used here are inferred from its table 2.".into(),
             "The X of tables 5 and 6 is not physically realisable: used for linear algebra only."
                 .into(),
         ],
+        ..IdentificationResult::default()
     }
 }
 
@@ -395,5 +391,6 @@ fn estimate_result(e: &Estimate, names: &[String], condition: f64) -> EstimateRe
             equilibrated: Some(e.condition_number.equilibrated),
             weighted: None,
         },
+        ..EstimateResult::default()
     }
 }

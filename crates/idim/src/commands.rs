@@ -1,0 +1,359 @@
+//! Commands beside `identify`: loads, drive gains, torque constants.
+
+use crate::check::Waiver;
+use crate::cli::{RobotChanges, load, say};
+use crate::drive_gains::drive_gains;
+use crate::error::Error;
+use crate::identify::{Identification, IdentifyOptions, identify};
+use crate::load::{LoadedRobot, read_text};
+use crate::log_spec::LogSpec;
+use crate::logs::{Logs, read_logs, read_mapping};
+use crate::payload::identify_payload;
+use crate::plan::SamplingOptions;
+use crate::report::warnings_text;
+use crate::table::{number, optional, table};
+use crate::torque_constants::torque_constant;
+use clap::Args;
+use idim_model::DriveColumns;
+use std::fmt::Write as _;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// A robot, its runs without load and those with one.
+#[derive(Debug, Clone, Args)]
+pub struct LoadedRuns {
+    /// Robot file, .ron or .urdf.
+    #[arg(long, value_name = "FILE")]
+    pub robot: PathBuf,
+    /// Log of the arm without load; may be repeated.
+    #[arg(long, value_name = "LOG", num_args = 1.., required = true, value_parser = LogSpec::parse)]
+    pub log: Vec<LogSpec>,
+    /// Log of the arm with the load; may be repeated.
+    #[arg(long, value_name = "LOG", num_args = 1.., required = true, value_parser = LogSpec::parse)]
+    pub loaded: Vec<LogSpec>,
+    /// Link that carries the load (default: the last).
+    #[arg(long, value_name = "LINK")]
+    pub on: Option<String>,
+    /// Which column holds what, where the header does not say so (RON).
+    #[arg(long, value_name = "FILE")]
+    pub mapping: Option<PathBuf>,
+    /// Take q, qd, qdd and torque as they are.
+    #[arg(long)]
+    pub as_recorded: bool,
+    /// Low-pass of positions and velocities, Hz (default: from the motion's bandwidth).
+    #[arg(long, value_name = "HZ")]
+    pub cutoff: Option<f64>,
+    /// Finding of the log doctor that does not stop the run, CODE or CODE:JOINT; may be repeated.
+    #[arg(long, value_name = "CODE[:JOINT]")]
+    pub waive: Vec<Waiver>,
+    /// Changes to the robot.
+    #[command(flatten)]
+    pub changes: RobotChanges,
+    /// Print the answer as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `drive-gains`.
+#[derive(Debug, Clone, Args)]
+pub struct DriveGainsArgs {
+    /// The runs.
+    #[command(flatten)]
+    pub runs: LoadedRuns,
+    /// Weighed mass of the load, kg: the scale of everything.
+    #[arg(long, value_name = "KG")]
+    pub mass: f64,
+}
+
+/// Arguments of `torque-constants`.
+#[derive(Debug, Clone, Args)]
+pub struct TorqueConstantsArgs {
+    /// CSV with a header: `speed` (rad/s, of the motor), `voltage` (V, terminals open), and `motor` where there are several.
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// Print the answer as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The arm from its runs without load, and both sets of logs.
+struct Runs {
+    loaded: LoadedRobot,
+    arm: Identification,
+    without: Logs,
+    with: Logs,
+    link: usize,
+}
+
+fn runs(args: &LoadedRuns) -> Result<Runs, Error> {
+    let loaded = load(&args.robot, &args.changes)?;
+    let mapping = read_mapping(args.mapping.as_ref())?;
+    let without = read_logs(&args.log, &loaded, &mapping, &args.waive)?;
+    let with = read_logs(&args.loaded, &loaded, &mapping, &args.waive)?;
+    let links = loaded.robot.links();
+    let link = match &args.on {
+        None => links.len() - 1,
+        Some(name) => links.iter().position(|l| l.name == *name).ok_or_else(|| {
+            let names: Vec<&str> = links.iter().map(|l| l.name.as_str()).collect();
+            let rule = format!("the links are {}", names.join(", "));
+            Error::input(format!("--on {name}"), "no such link", rule)
+        })?,
+    };
+    let options = IdentifyOptions {
+        columns: DriveColumns::ALL,
+        sampling: SamplingOptions {
+            as_recorded: args.as_recorded,
+            cutoff: args.cutoff,
+            ..SamplingOptions::default()
+        },
+        ..IdentifyOptions::default()
+    };
+    // All of the runs without load train: what proves the arm is `identify`.
+    let arm = identify(
+        &loaded,
+        without.measurements.clone(),
+        without.measurements.clone(),
+        &options,
+    )?;
+    Ok(Runs {
+        loaded,
+        arm,
+        without,
+        with,
+        link,
+    })
+}
+
+/// The load on a link of an arm that its own runs identify.
+///
+/// # Errors
+/// Bad input.
+pub(crate) fn payload(args: &LoadedRuns, out: &mut dyn Write) -> Result<(), Error> {
+    let runs = runs(args)?;
+    let found = identify_payload(&runs.loaded, &runs.arm, &runs.with.measurements, runs.link)?;
+    if args.json {
+        let parameters: Vec<_> = (0..found.names.len())
+            .map(|k| {
+                serde_json::json!({
+                    "name": found.names[k],
+                    "value": found.values[k],
+                    "std": found.standard_deviation[k],
+                    "std_from_arm": found.from_arm[k],
+                })
+            })
+            .collect();
+        let json = serde_json::json!({
+            "schema": "idim-payload/1",
+            "link": runs.loaded.robot.links()[runs.link].name,
+            "parameters": parameters,
+            "noise": found.noise,
+        });
+        return say(out, &format!("{json:#}\n"));
+    }
+    let rows = (0..found.names.len()).map(|k| {
+        [
+            found.relations[k].clone(),
+            number(found.values[k]),
+            number(found.standard_deviation[k]),
+            number(found.from_arm[k]),
+        ]
+    });
+    let mut text = format!(
+        "Load on {} (SI, in its frame)\n{}",
+        runs.loaded.robot.links()[runs.link].name,
+        table(["parameter", "value", "std", "of it from the arm"], rows),
+    );
+    let at = |name: &str| {
+        found
+            .names
+            .iter()
+            .position(|n| n.trim_end_matches(char::is_numeric) == name)
+    };
+    if let (Some(m), Some(x), Some(y), Some(z)) = (at("M"), at("MX"), at("MY"), at("MZ")) {
+        let mass = found.values[m];
+        let _ = writeln!(
+            text,
+            "mass {} kg, centre of mass ({}, {}, {}) m",
+            number(mass),
+            number(found.values[x] / mass),
+            number(found.values[y] / mass),
+            number(found.values[z] / mass),
+        );
+    }
+    let mut notes = runs.arm.result.warnings.clone();
+    notes.extend(
+        runs.without
+            .inferred
+            .iter()
+            .chain(&runs.with.inferred)
+            .cloned(),
+    );
+    say(out, &(text + &warnings_text(&notes)))
+}
+
+/// Gains of the drives from runs with and without a known load.
+///
+/// # Errors
+/// Bad input.
+pub(crate) fn run_drive_gains(args: &DriveGainsArgs, out: &mut dyn Write) -> Result<(), Error> {
+    if !(args.mass > 0.0 && args.mass.is_finite()) {
+        let rule = "give the weighed mass in kg, above zero";
+        return Err(Error::input("--mass", args.mass.to_string(), rule));
+    }
+    let runs = runs(&args.runs)?;
+    let found = drive_gains(
+        &runs.loaded,
+        &runs.arm,
+        &runs.without.measurements,
+        &runs.with.measurements,
+        runs.link,
+        args.mass,
+    )?;
+    if args.runs.json {
+        let json = serde_json::json!({
+            "schema": "idim-drive-gains/1",
+            "joints": runs.arm.joints,
+            "gains": found.gains,
+            "std": found.standard_deviation,
+            "validity": found.validity,
+            "warnings": found.warnings,
+        });
+        return say(out, &format!("{json:#}\n"));
+    }
+    let rows = runs.arm.joints.iter().enumerate().map(|(k, name)| {
+        [
+            name.clone(),
+            found.gains[k].map_or_else(|| "not separable".into(), number),
+            optional(found.standard_deviation[k]),
+        ]
+    });
+    let text = format!(
+        "Drive gains: true torque per unit of the recorded one\n{}validity {}\n",
+        table(["joint", "gain", "std"], rows),
+        optional(found.validity),
+    );
+    let mut notes = found.warnings;
+    notes.extend(
+        runs.without
+            .inferred
+            .iter()
+            .chain(&runs.with.inferred)
+            .cloned(),
+    );
+    say(out, &(text + &warnings_text(&notes)))
+}
+
+/// Torque constants from speeds and voltages.
+///
+/// # Errors
+/// Bad input.
+pub(crate) fn torque_constants(
+    args: &TorqueConstantsArgs,
+    out: &mut dyn Write,
+) -> Result<(), Error> {
+    let motors = read_back_emf(&args.file)?;
+    let mut rows = Vec::new();
+    let mut json = Vec::new();
+    let mut notes = Vec::new();
+    for BackEmf {
+        motor,
+        speed,
+        voltage,
+    } in &motors
+    {
+        let k = torque_constant(speed, voltage)?;
+        if k.speeds[0] * k.speeds[1] >= 0.0 {
+            notes.push(format!(
+                "{motor}: turned in one direction only, so an offset that changes with direction is part of the constant; turn it both ways"
+            ));
+        }
+        json.push(serde_json::json!({
+            "motor": motor, "torque_constant": k.value, "std": k.standard_deviation,
+            "offset": k.offset, "rms": k.rms, "n_samples": speed.len(),
+        }));
+        rows.push([
+            motor.clone(),
+            number(k.value),
+            number(k.standard_deviation),
+            number(k.offset),
+            number(k.rms),
+            speed.len().to_string(),
+        ]);
+    }
+    if args.json {
+        let json = serde_json::json!({ "schema": "idim-torque-constants/1", "motors": json });
+        return say(out, &format!("{json:#}\n"));
+    }
+    let header = [
+        "motor",
+        "constant N·m/A",
+        "std",
+        "offset V",
+        "rms V",
+        "samples",
+    ];
+    let text = format!("Torque constants from back-EMF\n{}", table(header, rows));
+    say(out, &(text + &warnings_text(&notes)))
+}
+
+/// What was recorded of one motor.
+struct BackEmf {
+    motor: String,
+    speed: Vec<f64>,
+    voltage: Vec<f64>,
+}
+
+/// Speeds and voltages of each motor of a file, in the order they appear.
+fn read_back_emf(file: &Path) -> Result<Vec<BackEmf>, Error> {
+    let text = read_text(file)?;
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .filter(|(_, l)| !l.trim().is_empty());
+    let name = file.display().to_string();
+    let refuse = |line: usize, met: String, rule: &str| {
+        Err(Error::input(
+            format!("{name}, line {}", line + 1),
+            met,
+            rule,
+        ))
+    };
+    let header = lines.next().map_or("", |(_, l)| l);
+    let columns: Vec<String> = header.split(',').map(|h| h.trim().to_lowercase()).collect();
+    let at = |wanted: &str| {
+        columns
+            .iter()
+            .position(|c| c.split(['_', ' ', '[', '(']).next() == Some(wanted))
+    };
+    let (Some(s), Some(v)) = (at("speed"), at("voltage")) else {
+        let rule =
+            "name the columns speed (rad/s) and voltage (V), and motor where there are several";
+        return refuse(0, format!("header `{header}`"), rule);
+    };
+    let motor = at("motor");
+    let mut motors: Vec<BackEmf> = Vec::new();
+    for (k, line) in lines {
+        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        let number = |c: usize| cells.get(c).and_then(|t| t.parse::<f64>().ok());
+        let (Some(speed), Some(voltage)) = (number(s), number(v)) else {
+            return refuse(
+                k,
+                format!("`{line}`"),
+                "every line has a number for speed and voltage",
+            );
+        };
+        let own = motor.and_then(|m| cells.get(m)).copied().unwrap_or("motor");
+        let found = motors.iter().position(|m| m.motor == own);
+        let at = found.unwrap_or_else(|| {
+            motors.push(BackEmf {
+                motor: own.to_owned(),
+                speed: Vec::new(),
+                voltage: Vec::new(),
+            });
+            motors.len() - 1
+        });
+        motors[at].speed.push(speed);
+        motors[at].voltage.push(voltage);
+    }
+    Ok(motors)
+}
