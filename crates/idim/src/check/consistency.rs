@@ -8,7 +8,7 @@
 use super::faults::Fault;
 use super::moments::{Consistency, Moments};
 use super::readings::{Candidate, Reading, candidates, finer, plain_factors};
-use super::rows::{LONGEST, Motors, RowMaker, Samples};
+use super::rows::{LONGEST, Motors, RowMaker, Samples, mixed};
 use idim_measurement::Place;
 use idim_measurement::doctor::{Finding, Severity};
 use idim_model::{JointStates, Robot};
@@ -144,8 +144,10 @@ impl Look<'_> {
                 samples.read_as(self.motors, &reading.position, &reading.position_scale);
             let rows = maker.rows(&states, &fastest);
             let late = (lag != 0.0).then(|| samples.late_torque(lag));
-            let torque = late.as_ref().unwrap_or(&samples.torque);
-            Moments::new(&rows, maker.p, torque, &samples.fold)
+            let torque = late.unwrap_or_else(|| samples.torque.clone());
+            let torque = self.motors.columns(torque);
+            let rows = self.motors.rows_of_columns(rows, maker.p);
+            Moments::new(&rows, maker.p, &torque, &samples.fold)
         };
         let first = of(&self.samples[0]);
         let others = self.samples[1..].iter();
@@ -196,7 +198,8 @@ impl Look<'_> {
             .iter()
             .map(|s| {
                 let (states, fastest) = s.read_as(self.motors, &now.position, &now.position_scale);
-                (states, fastest, mixed(&share, &s.torque))
+                let torque = self.motors.columns(s.torque.clone());
+                (states, fastest, mixed(&share, &torque))
             })
             .collect();
         let n = now.torque.len();
@@ -217,25 +220,6 @@ impl Look<'_> {
             .map(|j| error(j, false).min(error(j, true)))
             .collect()
     }
-}
-
-/// Torques of the joints from channels.
-fn mixed(share: &[f64], channels: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let n = channels.len();
-    (0..n)
-        .map(|j| {
-            let mut out = vec![0.0; channels[0].len()];
-            for (c, channel) in channels.iter().enumerate() {
-                let by = share[j * n + c];
-                if by != 0.0 {
-                    for (o, x) in out.iter_mut().zip(channel) {
-                        *o += by * x;
-                    }
-                }
-            }
-            out
-        })
-        .collect()
 }
 
 /// What describes the torque of joint `j` at sample `k` without a robot; at length also by its neighbours: planes of

@@ -7,6 +7,7 @@ use idim_model::{
     Columns, DriveColumns, JointStates, LogSide, Model, ParameterKind, Robot,
     visit_torque_regressor,
 };
+use nalgebra::DMatrix;
 
 /// Low-pass of positions and torques alike, Hz: what arms are moved with.
 const CUTOFF: f64 = 10.0;
@@ -150,10 +151,12 @@ impl Samples {
     }
 }
 
-/// What the columns of a log were multiplied by on their way to the joints. Couplings are left as they are: a fault of a
-/// motor that turns with several joints is looked for at its own joint.
+/// What the columns of a log were multiplied by on their way to the joints. Torques of
+/// motors that turn with several joints are judged as the motors'; a fault of their positions at their own joints.
 #[derive(Debug, Clone)]
 pub(crate) struct Motors {
+    /// Torques of the columns from torques of the joints, where motors turn with several joints; `[column · n + joint]`.
+    columns_from_joints: Option<Vec<f64>>,
     /// Gear ratios where positions and torques are recorded at the motors, else ones.
     position_gear: Vec<f64>,
     torque_gear: Vec<f64>,
@@ -172,7 +175,16 @@ impl Motors {
             own.map(|g| if side { g.unwrap_or(1.0) } else { 1.0 })
                 .collect()
         };
+        // Torques of the joints are those of the motors, each times its own ratio, through `turns` transposed.
+        let mut turns = DMatrix::identity(n, n);
+        for c in &drives.couplings {
+            let own = robot.joints()[c.motor].actuator.gear_ratio;
+            turns[(c.motor, c.joint)] = c.ratio / own.unwrap_or(1.0);
+        }
+        let coupled = torques && !drives.couplings.is_empty();
+        let inverse = turns.transpose().try_inverse().filter(|_| coupled);
         Self {
+            columns_from_joints: inverse.map(|m| (0..n * n).map(|k| m[(k / n, k % n)]).collect()),
             position_gear: gear(positions),
             torque_gear: gear(torques),
             zero: if positions {
@@ -204,6 +216,54 @@ impl Motors {
         }
         reading
     }
+
+    /// Torques of the columns from torques of the joints.
+    pub(crate) fn columns(&self, torque: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+        match &self.columns_from_joints {
+            Some(change) => mixed(change, &torque),
+            None => torque,
+        }
+    }
+
+    /// Rows of the columns from rows of the joints, `p` numbers each.
+    pub(crate) fn rows_of_columns(&self, rows: Vec<f64>, p: usize) -> Vec<f64> {
+        let Some(change) = &self.columns_from_joints else {
+            return rows;
+        };
+        let n = self.zero.len();
+        let mut out = vec![0.0; rows.len()];
+        for (to, from) in out.chunks_exact_mut(n * p).zip(rows.chunks_exact(n * p)) {
+            for (k, &by) in change.iter().enumerate() {
+                if by == 0.0 {
+                    continue;
+                }
+                let to = &mut to[k / n * p..][..p];
+                for (t, f) in to.iter_mut().zip(&from[k % n * p..][..p]) {
+                    *t += by * f;
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Torques of the joints from channels.
+pub(crate) fn mixed(share: &[f64], channels: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let n = channels.len();
+    (0..n)
+        .map(|j| {
+            let mut out = vec![0.0; channels[0].len()];
+            for (c, channel) in channels.iter().enumerate() {
+                let by = share[j * n + c];
+                if by != 0.0 {
+                    for (o, x) in out.iter_mut().zip(channel) {
+                        *o += by * x;
+                    }
+                }
+            }
+            out
+        })
+        .collect()
 }
 
 /// What a robot's rows are made of: base columns, and those of couplings and known torques.
