@@ -135,13 +135,17 @@ fn of_held_out(v: &ErrorResult) -> (Level, &'static str, String) {
         .filter(|j| j.r2 < FAIR_R2)
         .map(|j| j.name.as_str())
         .collect();
+    let share = if percent > 0.0 {
+        format!("only {percent:.1} % of the variance")
+    } else {
+        "nothing".to_owned()
+    };
     (
         Level::Poor,
         "Not to be trusted.",
         format!(
-            "On motion it has not seen, the model fails at {}: it explains only {:.1} % of the variance of the torque of {}. Friction, units, signs or too small a motion are the usual reasons.",
+            "On motion it has not seen, the model fails at {}: it explains {share} of the torque of {}. Friction, units, signs or too small a motion are the usual reasons.",
             lost.join(", "),
-            percent.max(0.0),
             worst.name
         ),
     )
