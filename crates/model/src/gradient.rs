@@ -244,15 +244,18 @@ impl<C> Workspace<C> {
     #[inline(always)]
     fn outward<T: Lane<Cell = C>>(&mut self, at: T::At, model: &Model, [q, qd, qdd]: [&[C]; 3]) {
         let base = LinkMotion::<T>::base(at, model);
+        // Side by side: sines and cosines wait for nothing but themselves.
+        for ((joint, q), travel) in model.joints.iter().zip(q).zip(&mut self.travel) {
+            Travel::new(joint, T::read(at, q)).write(at, travel);
+        }
         for (j, joint) in model.joints.iter().enumerate() {
-            let travel = Travel::new(joint, T::read(at, &q[j]));
+            let travel = Travel::read(at, joint.kind, &self.travel[j]);
             let below = match joint.parent {
                 Some(p) => LinkMotion::read(at, &self.motion[p]),
                 None => base,
             };
             let carried = below.carried(joint, travel);
             let (qd, qdd) = (T::read(at, &qd[j]), T::read(at, &qdd[j]));
-            travel.write(at, &mut self.travel[j]);
             carried.write(at, &mut self.carried[j]);
             carried
                 .moved(travel, qd, qdd)

@@ -234,3 +234,35 @@ fn mass_matrix_derivative(model: &Model, pi: &[f64], q: &[f64], k: usize) -> DMa
         .collect();
     DMatrix::from_columns(&columns)
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    #[test]
+    fn identity_every_instruction_set_gives_the_same_regressor((robot, state) in robot_and_state()) {
+        let model = Model::new(&robot);
+        let n = robot.n_joints();
+        let columns = Columns::standard(n, DriveColumns::ALL);
+        let mut states = crate::states::LaneStates::new(n);
+        states.load(&JointStates::from_states(std::slice::from_ref(&state)), 0);
+        let plan = crate::projection::Plan::new(&model, &columns);
+        let one = torque_regressor(&model, &columns, &state);
+        for arch in crate::testing::architectures() {
+            let mut rows = vec![crate::wide::F64x8::ZERO; n * columns.len()];
+            let ends = [crate::wide::F64x8::ZERO, crate::wide::F64x8::ONE];
+            let mut fill = crate::regressor::Fill {
+                model: &model,
+                plan: &plan,
+                state: states.state(),
+                kinematics: &mut crate::projection::Kinematics::new(&model, ends),
+                rows: &mut rows,
+            };
+            crate::wide::over_eight_on(arch, &mut fill);
+            for (k, cell) in rows.iter().enumerate() {
+                for x in cell.0 {
+                    prop_assert_eq!(x, one[(k / columns.len(), k % columns.len())]);
+                }
+            }
+        }
+    }
+}

@@ -27,6 +27,8 @@ pub(crate) trait Lane:
     fn sin_cos(self, quarters: u64) -> (Self, Self);
     /// -1, 0 or 1.
     fn sign(self) -> Self;
+    /// The negative where `sign` is -0, itself where it is 0.
+    fn flipped(self, sign: f64) -> Self;
 }
 
 /// An operation written once for every lane whose cells are `C`; it is compiled for several instruction sets.
@@ -68,6 +70,10 @@ impl Lane for f64 {
     #[inline(always)]
     fn sign(self) -> Self {
         f64::from(i8::from(self > 0.0) - i8::from(self < 0.0))
+    }
+    #[inline(always)]
+    fn flipped(self, sign: f64) -> Self {
+        f64::from_bits(self.to_bits() ^ sign.to_bits())
     }
 }
 

@@ -49,6 +49,7 @@ mod states;
 mod suggestion;
 #[cfg(test)]
 mod testing;
+mod tiles;
 mod urdf;
 mod wide;
 mod wrench_map;
@@ -74,4 +75,6 @@ pub use robot::{
 };
 pub use robot_file::{robot_from_ron, robot_to_ron};
 pub use states::{JointState, JointStates, random_states};
+pub use tiles::RegressorTiles;
 pub use urdf::{robot_from_urdf, robot_from_urdf_with};
+pub use wide::F64x8;

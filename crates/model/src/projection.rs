@@ -15,6 +15,7 @@ use crate::wrench_map::{ABOUT_Z, ACROSS, ANY, WrenchMap};
 /// Which entry of which link goes to which column, found once.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
+    /// Distance of the rows: the number of columns, unless they are spread.
     pub(crate) n_columns: usize,
     pub(crate) links: Vec<LinkPlan>,
     /// For each joint: (drive kind, column).
@@ -38,9 +39,9 @@ pub(crate) struct Twin {
 pub(crate) struct LinkPlan {
     /// Bit k: entry k is asked for.
     wanted: u16,
-    /// Bit k: its column is the entry's negative.
-    negated: u16,
     column: [usize; 10],
+    /// -0 where the column is the entry's negative, else 0: to flip its sign by.
+    sign: [f64; 10],
 }
 
 /// All ten entries of a link.
@@ -69,11 +70,8 @@ impl LinkPlan {
     /// Writes entry `k`, which is asked for, to its column of a row.
     #[inline(always)]
     fn put<T: Lane>(&self, at: T::At, k: usize, row: &mut [T::Cell], value: T) {
-        let value = if self.negated >> k & 1 == 1 {
-            -value
-        } else {
-            value
-        };
+        // Without a branch: there is one of these for every entry of the regressor.
+        let value = value.flipped(self.sign[k]);
         value.write(at, &mut row[self.column[k]]);
     }
 
@@ -83,12 +81,7 @@ impl LinkPlan {
         if !self.wants::<ASK>(k) {
             return T::splat(at, 0.0);
         }
-        let value = T::read(at, &row[self.column[k]]);
-        if self.negated >> k & 1 == 1 {
-            -value
-        } else {
-            value
-        }
+        T::read(at, &row[self.column[k]]).flipped(self.sign[k])
     }
 }
 
@@ -124,10 +117,25 @@ impl Plan {
                 continue;
             }
             link.wanted |= 1 << entry;
-            link.negated |= u16::from(sign < 0.0) << entry;
+            link.sign[entry] = 0.0_f64.copysign(sign);
             link.column[entry] = column;
         }
         plan
+    }
+
+    /// The same entries where column `c` stands at `place(c)` of rows `distance` apart.
+    pub(crate) fn spread(mut self, distance: usize, place: impl Fn(usize) -> usize) -> Self {
+        self.n_columns = distance;
+        for link in &mut self.links {
+            link.column = link.column.map(&place);
+        }
+        for (_, column) in self.drives.iter_mut().flatten() {
+            *column = place(*column);
+        }
+        for twin in &mut self.twins {
+            (twin.column, twin.first) = (place(twin.column), place(twin.first));
+        }
+        self
     }
 }
 
@@ -135,6 +143,8 @@ impl Plan {
 #[derive(Debug, Clone)]
 pub(crate) struct Kinematics<C> {
     n: usize,
+    /// Sine and cosine, or travel, of every joint.
+    travel: Vec<[C; 2]>,
     /// Motion of every link; before its turn has come, of the link below at this joint's origin.
     motion: Vec<LinkMotion<C>>,
     /// At `link * n + d`: direction `d` of the link's path; the last one is z and stays.
@@ -149,6 +159,7 @@ impl<C: Copy> Kinematics<C> {
         let n = model.n_joints();
         Self {
             n,
+            travel: vec![[zero; 2]; n],
             motion: vec![zero_motion(zero); n],
             direction: vec![[zero, zero, one]; n * n],
             linear: vec![[zero; 3]; n * n],
@@ -177,6 +188,14 @@ impl<C: Copy> Kinematics<C> {
         }
     }
 
+    /// Sines and cosines of all joints: side by side, for they wait for nothing but themselves.
+    #[inline(always)]
+    fn turn_joints<T: Lane<Cell = C>>(&mut self, at: T::At, model: &Model, q: &[C]) {
+        for ((joint, q), travel) in model.joints.iter().zip(q).zip(&mut self.travel) {
+            Travel::new(joint, T::read(at, q)).write(at, travel);
+        }
+    }
+
     /// Takes link `j` from the link below: its motion and the axes on its path.
     #[inline(always)]
     fn go_out<T: Lane<Cell = C>>(
@@ -184,13 +203,12 @@ impl<C: Copy> Kinematics<C> {
         at: T::At,
         model: &Model,
         j: usize,
-        [q, qd, qdd]: [T; 3],
+        [qd, qdd]: [T; 2],
     ) -> WrenchMap<T> {
         // The same lines for every step, compiled once for each simple one.
-        match (
-            model.joints[j].step.rotation,
-            Travel::new(&model.joints[j], q),
-        ) {
+        let joint = &model.joints[j];
+        let travel = Travel::read(at, joint.kind, &self.travel[j]);
+        match (joint.step.rotation, travel) {
             (Rotation::Quarter, Travel::Turn { s, c }) => {
                 let step = (Rotation::Quarter, Travel::Turn { s, c });
                 self.carry_axes(at, model, j, step);
@@ -349,10 +367,10 @@ pub(crate) fn fill<T: Lane>(
     rows: &mut [T::Cell],
 ) {
     let p = plan.n_columns;
+    kinematics.turn_joints::<T>(at, model, q);
     for (j, joint) in model.joints.iter().enumerate() {
-        let q = T::read(at, &q[j]);
         let (qd, qdd) = (T::read(at, &qd[j]), T::read(at, &qdd[j]));
-        let map = kinematics.go_out(at, model, j, [q, qd, qdd]);
+        let map = kinematics.go_out(at, model, j, [qd, qdd]);
         let link = &plan.links[j];
         if !link.is_empty() {
             let to = Target { at, j, link, p };

@@ -68,6 +68,9 @@ impl Lane for Dual {
     fn sign(self) -> Self {
         dual(self.re.signum(), 0.0)
     }
+    fn flipped(self, sign: f64) -> Self {
+        if sign.is_sign_negative() { -self } else { self }
+    }
 }
 
 /// The instruction sets of this machine the kernels are compiled for.

@@ -5,9 +5,9 @@ use pulp::{Arch, Simd, WithSimd};
 use std::ops::{Add, Mul, Neg, Sub};
 
 /// A number of eight samples in memory, a cache line.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
-pub(crate) struct F64x8(pub(crate) [f64; 8]);
+pub struct F64x8(pub [f64; 8]);
 
 impl F64x8 {
     pub(crate) const ZERO: Self = Self([0.0; 8]);
@@ -18,6 +18,8 @@ impl F64x8 {
 ///
 /// It carries the proof that the machine has the instructions; every operation is one of them.
 #[derive(Clone, Copy)]
+// What does not fit the registers goes to the stack: there, too, as whole cache lines.
+#[repr(align(64))]
 pub(crate) struct Wide<S: Simd> {
     simd: S,
     x: S::f64s,
@@ -119,14 +121,15 @@ impl<S: Simd> Lane for Wide<S> {
         let cosine_stays = simd.equal_u64s(simd.and_u64s(next, two), none);
         let a = simd.select_f64s(even, sine.x, cosine.x);
         let b = simd.select_f64s(even, cosine.x, sine.x);
-        let mut s = self.with(simd.select_f64s(sine_stays, a, simd.neg_f64s(a)));
-        let mut c = self.with(simd.select_f64s(cosine_stays, b, simd.neg_f64s(b)));
+        let s = simd.select_f64s(sine_stays, a, simd.neg_f64s(a));
+        let c = simd.select_f64s(cosine_stays, b, simd.neg_f64s(b));
         let limit = simd.splat_f64s(REDUCTION_LIMIT);
         let small = simd.less_than_or_equal_f64s(simd.abs_f64s(self.x), limit);
         if simd.first_true_m64s(simd.not_m64s(small)) < S::F64_LANES {
-            again_where_large::<S>(&self.x, &mut s.x, &mut c.x, quarters);
+            let [s, c] = again_where_large::<S>(self.x, [s, c], quarters);
+            return (self.with(s), self.with(c));
         }
-        (s, c)
+        (self.with(s), self.with(c))
     }
     #[inline(always)]
     fn sign(self) -> Self {
@@ -136,21 +139,28 @@ impl<S: Simd> Lane for Wide<S> {
         let below = simd.select_f64s(simd.less_than_f64s(self.x, zero), one, zero);
         self.with(simd.sub_f64s(above, below))
     }
+    #[inline(always)]
+    fn flipped(self, sign: f64) -> Self {
+        let sign = self.simd.splat_f64s(sign);
+        self.with(self.simd.xor_f64s(self.x, sign))
+    }
 }
 
 /// Replaces sine and cosine of the angles beyond the reduction's limit; they are rare, and done one by one.
 #[cold]
 #[inline(never)]
-fn again_where_large<S: Simd>(x: &S::f64s, s: &mut S::f64s, c: &mut S::f64s, quarters: u64) {
-    let x: &[f64] = bytemuck::cast_slice(std::slice::from_ref(x));
-    let s: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(s));
-    let c: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(c));
-    for ((&x, s), c) in x.iter().zip(s).zip(c) {
+fn again_where_large<S: Simd>(x: S::f64s, sc: [S::f64s; 2], quarters: u64) -> [S::f64s; 2] {
+    let [mut s, mut c] = sc;
+    let x: &[f64] = bytemuck::cast_slice(std::slice::from_ref(&x));
+    let sines: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut s));
+    let cosines: &mut [f64] = bytemuck::cast_slice_mut(std::slice::from_mut(&mut c));
+    for ((&x, s), c) in x.iter().zip(sines).zip(cosines) {
         if x.abs() <= REDUCTION_LIMIT {
             continue;
         }
         (*s, *c) = sin_cos_large(x, quarters);
     }
+    [s, c]
 }
 
 /// Runs a kernel over eight samples with the best instructions of this machine.
@@ -187,6 +197,10 @@ impl<K: Kernel<F64x8>> WithSimd for Eight<'_, K> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
+        // One number at the alignment of a register on the stack: only then does the compiler align what it spills there,
+        // too. A register across two cache lines is slow to store and slower to read back.
+        let mut aligned = F64x8::ZERO;
+        std::hint::black_box(&mut aligned);
         for part in 0..Wide::<S>::PARTS {
             self.0.run::<Wide<S>>(Part { simd, part });
         }
