@@ -32,8 +32,10 @@
 
 mod box_lbfgs;
 mod clearance;
+mod condition;
 mod criterion;
 mod dense;
+mod eigenvalues;
 mod energy;
 mod energy_gradient;
 mod error;
@@ -68,6 +70,7 @@ mod torque_prior;
 mod torque_rate;
 
 pub use clearance::Clearance;
+pub use condition::{ConditionNumber, ConditionRoute, condition_number, log_condition_gradient};
 pub use criterion::{ConditionNumbers, Conditioning, Criterion, Equilibrium, Scaling};
 pub use error::Error;
 pub use fourier::{
