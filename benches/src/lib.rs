@@ -1,5 +1,7 @@
 //! What the benchmarks share: robots, columns, states and a clock that leaves out other processes.
 
+pub mod jobs;
+
 use idim_base_params::{Reduction, ReductionOptions, TriangularFactor, reduce};
 use idim_model::{
     Columns, DriveColumns, JointStates, Model, Robot, random_states, robot_from_urdf,
@@ -83,14 +85,14 @@ fn base_columns(robot: &Robot, model: &Model, columns: &Columns) -> Columns {
 /// Base columns and regrouping from 200 random states: the job of the bench `reduce`.
 pub fn reduction(robot: &Robot, model: &Model, columns: &Columns, order: &[usize]) -> Reduction {
     let mut factor = TriangularFactor::new(columns.len());
-    let mut row = vec![0.0; columns.len()];
+    let (n, p) = (robot.n_joints(), columns.len());
+    let mut rows = vec![0.0; 8 * n * p];
     visit_torque_regressor(model, columns, &random_states(robot, 200, 1), |block| {
-        for lane in 0..block.n_samples() {
-            for joint in 0..block.n_joints() {
-                block.copy_row(joint, lane, &mut row);
-                factor.push_rows(&row);
-            }
+        let rows = &mut rows[..block.n_samples() * n * p];
+        for (k, row) in rows.chunks_exact_mut(p).enumerate() {
+            block.copy_row(k % n, k / n, row);
         }
+        factor.push_rows(rows);
     });
     reduce(&factor, order, &ReductionOptions::default())
 }

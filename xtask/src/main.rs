@@ -1,4 +1,4 @@
-//! Driver of the workspace: `cargo xtask identify`, `cargo xtask reduce`, `cargo xtask tidy`.
+//! Driver of the workspace: `cargo xtask identify`, `cargo xtask reduce`, `cargo xtask gate`, `cargo xtask tidy`.
 
 use clap::{Parser, Subcommand};
 use std::path::Path;
@@ -20,12 +20,33 @@ enum Task {
     Idim(idim::cli::Command),
     /// Check the rules of the house that a machine can check.
     Tidy,
+    /// Compare the kernels' instruction counts with the committed ones (needs valgrind).
+    Gate {
+        /// Write the new counts instead.
+        #[arg(long)]
+        bless: bool,
+    },
 }
 
 fn main() -> ExitCode {
     match Arguments::parse().task {
         Task::Idim(command) => idim::cli::main(&command),
         Task::Tidy => tidy(),
+        Task::Gate { bless } => gate(bless),
+    }
+}
+
+fn gate(bless: bool) -> ExitCode {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    match xtask::gate::run(&root, bless) {
+        Ok(table) => {
+            println!("{table}");
+            ExitCode::SUCCESS
+        }
+        Err(findings) => {
+            eprintln!("{findings}");
+            ExitCode::FAILURE
+        }
     }
 }
 

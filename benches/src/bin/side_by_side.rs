@@ -1,8 +1,7 @@
 //! CPU time of the kernels beside the anchors' figures: run both in the same minute, on the same core.
 #![allow(clippy::print_stdout)]
 
-use faer::Side;
-use idim_benches::{Case, cpu_time};
+use idim_benches::{Case, cpu_seconds, cpu_time, jobs, reduction};
 use idim_excitation::information_matrix;
 use idim_model::{
     RegressorWorkspace, regressor_contraction_gradient, squared_torque_gradient, torque_regressor,
@@ -12,6 +11,7 @@ use std::hint::black_box;
 
 /// Not a power of two: the joints' arrays would share the sets of the first-level cache.
 const SAMPLES: usize = 4000;
+const LEAST_SQUARES_SAMPLES: usize = 1_000_000;
 
 fn main() {
     for case in [Case::ur5(), Case::panda()] {
@@ -19,7 +19,29 @@ fn main() {
         regressor(&case);
         condition(&case);
         gradient(&case);
+        let order: Vec<usize> = (0..case.standard.len()).collect();
+        let time = cpu_time(41, || {
+            black_box(reduction(&case.robot, &case.model, &case.standard, &order));
+        });
+        line("reduction", time, 1, "ms", 1e3);
     }
+    let case = Case::ur5();
+    let start = cpu_seconds();
+    let design = jobs::excitation_start(&case, 0);
+    println!(
+        "  one excitation start: {:.3} s, cond {:.2}",
+        cpu_seconds() - start,
+        design.values[0]
+    );
+    let columns = case.with_friction();
+    let states = case.states(LEAST_SQUARES_SAMPLES);
+    let start = cpu_seconds();
+    black_box(jobs::least_squares(&case, &columns, &states));
+    println!(
+        "  least squares by running QR, {LEAST_SQUARES_SAMPLES} samples, {} columns: {:.3} s",
+        columns.len(),
+        cpu_seconds() - start
+    );
 }
 
 fn line(what: &str, (least, median): (f64, f64), per: usize, unit: &str, scale: f64) {
@@ -89,13 +111,18 @@ fn condition(case: &Case) {
             1e3,
         );
         let time = cpu_time(41, || {
-            let eigenvalues = information()
-                .self_adjoint_eigenvalues(Side::Lower)
-                .expect("finite");
-            black_box((eigenvalues[eigenvalues.len() - 1] / eigenvalues[0]).sqrt());
+            black_box(jobs::condition(case, &states));
         });
         line(
             &format!("states to cond, {n_samples} samples"),
+            time,
+            1,
+            "ms",
+            1e3,
+        );
+        let time = cpu_time(41, || jobs::gradient(case, &states));
+        line(
+            &format!("log cond and its gradient, {n_samples} samples"),
             time,
             1,
             "ms",
