@@ -1,6 +1,7 @@
 //! Gradients against derivatives of the regressor by dual numbers.
 
-use crate::projection::{Kinematics, Plan, fill};
+use crate::plan::Plan;
+use crate::projection::{Kinematics, fill};
 use crate::testing::{Dual, dual, robot_and_state};
 use crate::*;
 use proptest::prelude::*;

@@ -245,7 +245,7 @@ proptest! {
         let columns = Columns::standard(n, DriveColumns::ALL);
         let mut states = crate::states::LaneStates::new(n);
         states.load(&JointStates::from_states(std::slice::from_ref(&state)), 0);
-        let plan = crate::projection::Plan::new(&model, &columns);
+        let plan = crate::plan::Plan::new(&model, &columns);
         let one = torque_regressor(&model, &columns, &state);
         for arch in crate::testing::architectures() {
             let mut rows = vec![crate::wide::F64x8::ZERO; n * columns.len()];

@@ -40,6 +40,7 @@ mod lane;
 mod model;
 mod newton_euler;
 mod parameter;
+mod plan;
 mod pose;
 mod projection;
 mod regressor;

@@ -3,7 +3,8 @@
 use crate::lane::{Kernel, Lane};
 use crate::model::Model;
 use crate::parameter::Columns;
-use crate::projection::{Kinematics, Plan, fill};
+use crate::plan::Plan;
+use crate::projection::{Kinematics, fill};
 use crate::states::{JointState, JointStates, LaneStates};
 use crate::wide::{F64x8, over_eight, over_one};
 use nalgebra::DMatrix;

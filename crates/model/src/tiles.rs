@@ -2,7 +2,8 @@
 
 use crate::model::Model;
 use crate::parameter::Columns;
-use crate::projection::{Kinematics, Plan};
+use crate::plan::Plan;
+use crate::projection::Kinematics;
 use crate::regressor::Fill;
 use crate::states::{JointStates, LaneStates};
 use crate::wide::F64x8;
