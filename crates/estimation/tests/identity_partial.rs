@@ -143,7 +143,7 @@ fn identity_wild_rows_lose_their_say() {
         };
         let robust = fit(&w, &y, &used, &options);
         let moved = away(&robust);
-        assert!(moved < 0.3 * plain, "{loss:?}: {moved}, plain {plain}");
+        assert!(moved < 0.5 * plain, "{loss:?}: {moved}, plain {plain}");
         let heard = |r: &usize| used[*r] && robust.weights[*r] > 0.2;
         assert_eq!(wild.clone().filter(heard).count(), 0);
     }

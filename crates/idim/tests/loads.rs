@@ -1,0 +1,254 @@
+//! Loads, drive gains and torque constants, from simulated recordings whose truth is known.
+#![allow(clippy::unwrap_used)]
+
+use clap::Parser;
+use idim_model::{InertialParameters, Joint, Link, Robot, robot_from_ron, robot_to_ron};
+use nalgebra::{Matrix3, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+#[derive(Parser)]
+struct Arguments {
+    #[command(subcommand)]
+    command: idim::cli::Command,
+}
+
+fn run(arguments: &[&str]) -> Result<String, String> {
+    let loaded = ["payload", "drive-gains"].contains(&arguments[0]);
+    let waived = if loaded { &WAIVED[..] } else { &[] };
+    let all = ["idim"].iter().chain(arguments).chain(waived);
+    let parsed = Arguments::try_parse_from(all).map_err(|e| e.to_string())?;
+    let mut out = Vec::new();
+    idim::cli::run(&parsed.command, &mut out).map_err(|e| e.to_string())?;
+    Ok(String::from_utf8(out).unwrap())
+}
+
+fn json(arguments: &[&str]) -> Value {
+    serde_json::from_str(&run(arguments).unwrap()).unwrap()
+}
+
+/// What the doctor suspects of simulated torques, rightly where gains are wrong.
+const WAIVED: [&str; 8] = [
+    "--waive",
+    "gear-side",
+    "--waive",
+    "degrees",
+    "--waive",
+    "torque-sign",
+    "--waive",
+    "position-sign",
+];
+
+const MASS: f64 = 3.0;
+const CENTRE: [f64; 3] = [0.03, -0.02, 0.12];
+
+/// A load like a gripper with a part, in the frame of the last link.
+fn load() -> InertialParameters {
+    let inertia = Matrix3::from_diagonal(&Vector3::new(0.02, 0.03, 0.01));
+    InertialParameters::from_centre_of_mass(MASS, CENTRE.into(), &inertia)
+}
+
+/// A folder with a PUMA 560, logs of it without and with the load.
+struct Bench {
+    dir: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        let dir = tempfile::tempdir().unwrap();
+        let arm = robot_from_ron(idim_fixtures::PUMA560).unwrap();
+        let mut links: Vec<Link> = arm.links().to_vec();
+        let last = links.last_mut().unwrap();
+        last.inertial = last.inertial.map(|own| own.plus(&load()));
+        let joints: Vec<Joint> = arm.joints().to_vec();
+        let loaded = Robot::new("loaded", arm.gravity(), joints, links).unwrap();
+        std::fs::write(dir.path().join("arm.ron"), robot_to_ron(&arm)).unwrap();
+        std::fs::write(dir.path().join("loaded.ron"), robot_to_ron(&loaded)).unwrap();
+        let bench = Self { dir };
+        for (robot, log, seed) in [("arm", "without", "1"), ("loaded", "with", "2")] {
+            let (robot, log) = (
+                bench.path(&format!("{robot}.ron")),
+                bench.path(&format!("{log}.csv")),
+            );
+            let of = [
+                "--noise",
+                "0.01",
+                "--rate",
+                "100",
+                "--duration",
+                "30",
+                "--seed",
+                seed,
+            ];
+            let mut all = vec!["simulate", "--robot", &robot, "--out", &log];
+            all.extend(of);
+            run(&all).unwrap();
+        }
+        bench
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.dir.path().join(name).display().to_string()
+    }
+
+    /// The log with each joint's torque divided by its gain, as a drive with a wrong constant records it.
+    fn miscounted(&self, log: &str, gains: &[f64]) -> String {
+        let text = std::fs::read_to_string(self.path(log)).unwrap();
+        let mut lines = text.lines();
+        let header = lines.next().unwrap();
+        let torque: Vec<Option<f64>> = header
+            .split(',')
+            .map(|name| {
+                let number = name.strip_prefix("tau")?;
+                let digits: String = number.chars().take_while(char::is_ascii_digit).collect();
+                Some(gains[digits.parse::<usize>().ok()? - 1])
+            })
+            .collect();
+        assert_eq!(torque.iter().flatten().count(), gains.len(), "{header}");
+        let mut out = format!("{header}\n");
+        for line in lines {
+            let cells: Vec<String> = line
+                .split(',')
+                .zip(&torque)
+                .map(|(cell, gain)| match gain {
+                    Some(gain) => (cell.parse::<f64>().unwrap() / gain).to_string(),
+                    None => cell.to_owned(),
+                })
+                .collect();
+            let _ = writeln!(out, "{}", cells.join(","));
+        }
+        let name = format!("miscounted-{log}");
+        std::fs::write(self.path(&name), out).unwrap();
+        self.path(&name)
+    }
+}
+
+#[test]
+fn identity_a_load_is_found_within_its_uncertainty() {
+    let bench = Bench::new();
+    let [robot, without, with] = ["arm.ron", "without.csv", "with.csv"].map(|n| bench.path(n));
+    let found = json(&[
+        "payload", "--robot", &robot, "--log", &without, "--loaded", &with, "--json",
+    ]);
+    let truth = load().0;
+    // XX XY XZ YY YZ ZZ MX MY MZ M
+    let names = [
+        "XX6", "XY6", "XZ6", "YY6", "YZ6", "ZZ6", "MX6", "MY6", "MZ6", "M6",
+    ];
+    for p in found["parameters"].as_array().unwrap() {
+        let name = p["name"].as_str().unwrap();
+        let truth = truth[names.iter().position(|n| *n == name).unwrap()];
+        let (value, std) = (p["value"].as_f64().unwrap(), p["std"].as_f64().unwrap());
+        assert!(
+            (value - truth).abs() < 4.0 * std,
+            "{name}: {value} ± {std}, {truth}"
+        );
+        assert!(p["std_from_arm"].as_f64().unwrap() < std);
+        if name == "M6" {
+            assert!((value / MASS - 1.0).abs() < 0.02, "{value}");
+        }
+    }
+    let text = run(&[
+        "payload", "--robot", &robot, "--log", &without, "--loaded", &with,
+    ])
+    .unwrap();
+    assert!(text.contains("centre of mass"), "{text}");
+}
+
+#[test]
+fn identity_drive_gains_are_found_and_rest_on_the_weighed_mass() {
+    let bench = Bench::new();
+    let gains = [1.1, 0.9, 1.2, 1.05, 0.8, 1.0];
+    let robot = bench.path("arm.ron");
+    let (without, with) = (
+        bench.miscounted("without.csv", &gains),
+        bench.miscounted("with.csv", &gains),
+    );
+    let of_mass = |mass: f64| {
+        let mass = mass.to_string();
+        let runs = [
+            "drive-gains",
+            "--robot",
+            &robot,
+            "--log",
+            &without,
+            "--loaded",
+            &with,
+        ];
+        let mut all = runs.to_vec();
+        all.extend(["--mass", &mass, "--json"]);
+        let found = json(&all);
+        let gains = found["gains"].as_array().unwrap().clone();
+        let gains: Vec<Option<f64>> = gains.iter().map(Value::as_f64).collect();
+        (gains, found)
+    };
+    let (found, all) = of_mass(MASS);
+    for (k, truth) in gains.into_iter().enumerate() {
+        let gain = found[k].unwrap_or_else(|| panic!("joint {}: {all:#}", k + 1));
+        assert!(
+            (gain / truth - 1.0).abs() < 0.1,
+            "joint {}: {gain}, {truth}",
+            k + 1
+        );
+    }
+    let (wrong, _) = of_mass(1.1 * MASS);
+    for (a, b) in found.iter().zip(&wrong) {
+        let ratio = b.unwrap() / a.unwrap();
+        assert!((ratio - 1.1).abs() < 1e-6, "{ratio}");
+    }
+    // Twice the same runs: no load is felt, and the answer says so.
+    let nothing = json(&[
+        "drive-gains",
+        "--robot",
+        &robot,
+        "--log",
+        &without,
+        "--loaded",
+        &without,
+        "--mass",
+        "3",
+        "--json",
+    ]);
+    let gains = nothing["gains"].as_array().unwrap();
+    let told = gains.iter().filter(|g| g.as_f64().is_some()).count();
+    let said = nothing["warnings"].to_string();
+    assert!(
+        told == 0 || said.contains("separable") || said.contains("validity"),
+        "{nothing:#}"
+    );
+}
+
+#[test]
+fn identity_a_torque_constant_is_the_slope_of_back_emf() {
+    let dir = tempfile::tempdir().unwrap();
+    let file: PathBuf = dir.path().join("emf.csv");
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut text = String::from("motor,speed,voltage\n");
+    let (truth, mut noise) = ([0.19, 0.26], || -> f64 { StandardNormal.sample(&mut rng) });
+    for k in 0..400 {
+        let speed = 150.0 * (0.05 * f64::from(k)).sin();
+        for (motor, constant) in ["first", "second"].iter().zip(truth) {
+            let voltage = constant * speed + 0.3 + 0.2 * noise();
+            let _ = writeln!(text, "{motor},{speed},{voltage}");
+        }
+    }
+    std::fs::write(&file, text).unwrap();
+    let found = json(&["torque-constants", path(&file), "--json"]);
+    for (motor, truth) in found["motors"].as_array().unwrap().iter().zip(truth) {
+        let [value, std] = ["torque_constant", "std"].map(|k| motor[k].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * std && std < 2e-4, "{motor:#}");
+    }
+    let shown = run(&["torque-constants", path(&file)]).unwrap();
+    assert!(!shown.contains("one direction"), "{shown}");
+    std::fs::write(&file, "speed,voltage\n1,x\n").unwrap();
+    let refused = run(&["torque-constants", path(&file)]).unwrap_err();
+    assert!(refused.contains("line 2"), "{refused}");
+}
+
+fn path(file: &Path) -> &str {
+    file.to_str().unwrap()
+}
