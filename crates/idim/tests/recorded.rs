@@ -154,12 +154,7 @@ fn regress_tx40_predicts_what_it_has_not_seen() {
     let r2 = of_joints(&result, "validation_in_band", "r2");
     assert_at_least(&r2, &[0.995, 0.995, 0.989, 0.990, 0.912, 0.958]);
     // The authors' split: mostly standstill; they report 5.30 N·m, 4.47 with physical consistency.
-    // The doctor doubts the sign of joint 2 in a log that hardly moves.
-    let options: Vec<&str> = TX40_OPTIONS
-        .into_iter()
-        .chain(["--waive", "position-sign:joint_2"])
-        .collect();
-    let result = tx40.identified("0..24750", "29250..45000", &options);
+    let result = tx40.identified("0..24750", "29250..45000", &TX40_OPTIONS);
     let rms = of_joints(&result, "validation", "rms");
     let all = (rms.iter().map(|r| r * r).sum::<f64>() / 6.0).sqrt();
     assert!(all < 4.47, "{all}");

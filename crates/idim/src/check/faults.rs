@@ -34,6 +34,9 @@ pub(crate) enum Fault {
 }
 
 /// Rule of everything the rigid body betrays.
+/// A reading that lowers the joints' summed logarithmic errors by less is a suspicion and stops nothing: parts of good
+/// logs of the TX40 do so by 0.34.
+const SPOILS: f64 = 0.5;
 const RULE: &str = "the joints share masses and inertias, so their torques must agree about them";
 
 impl Fault {
@@ -70,7 +73,11 @@ impl Fault {
         );
         let finding = |code, place, value: f64, met: String, next: String| Finding {
             code,
-            severity: Severity::Error,
+            severity: if gain > SPOILS {
+                Severity::Error
+            } else {
+                Severity::Warning
+            },
             place,
             value: value.is_finite().then_some(value),
             met,
