@@ -129,8 +129,12 @@ pub struct IdentifyArgs {
     /// Leave out the rows of a joint slower than this, rad/s (m/s): one number, or one a joint.
     #[arg(long, value_name = "SPEED", value_delimiter = ',', value_parser = parse_positive)]
     pub dead_band: Vec<f64>,
-    /// Friction terms: auto, or [JOINT=]viscous,coulomb,offset,asymmetric,cubic,root,stribeck[:SPEED],load,tanh:SPEED; may be repeated.
-    #[arg(long, value_name = "TERMS")]
+    /// Friction terms, of all joints or of one.
+    #[arg(
+        long,
+        value_name = "TERMS",
+        help = "Friction terms: auto, or [JOINT=]viscous,coulomb,offset,asymmetric,cubic,root,stribeck[:SPEED],load,tanh:SPEED; may be repeated"
+    )]
     pub friction: Vec<String>,
     /// Weights: the joints' full residual covariance, or one variance a joint.
     #[arg(long, value_enum, default_value_t = WeightingChoice::Full)]
