@@ -5,11 +5,12 @@ use crate::error::Error;
 use crate::identify::Identification;
 use crate::load::LoadedRobot;
 use crate::samples::{Rows, push_rows, stretches};
+use crate::structure::MASS_FIRST;
 use faer::Mat;
 use idim_base_params::{ReductionOptions, TriangularFactor, reduce};
 use idim_estimation::{PartialOptions, PartialRows, partial_least_squares, whitened_factor};
 use idim_measurement::Measurements;
-use idim_model::{Columns, Notation, Parameter, ParameterKind, Robot};
+use idim_model::{Columns, Notation, Parameter, Robot};
 
 /// What a load is, in the frame of the link that carries it.
 #[derive(Debug, Clone)]
@@ -29,23 +30,6 @@ pub struct Payload {
     /// Standard deviation of each joint's residual, N·m.
     pub noise: Vec<f64>,
 }
-
-/// Mass first: a load whose inertia is not felt keeps its mass and first moments.
-const ORDER: [ParameterKind; 10] = {
-    use ParameterKind as K;
-    [
-        K::M,
-        K::MX,
-        K::MY,
-        K::MZ,
-        K::XX,
-        K::YY,
-        K::ZZ,
-        K::XY,
-        K::XZ,
-        K::YZ,
-    ]
-};
 
 /// The load on `link` that explains what the arm as identified leaves of the torques of these logs.
 ///
@@ -136,7 +120,11 @@ pub fn identify_payload(
 /// The ten columns of a load on a link, mass first.
 pub(crate) fn load_columns(link: usize) -> ModelColumns {
     ModelColumns {
-        standard: Columns(ORDER.map(|kind| Parameter { kind, index: link }).to_vec()),
+        standard: Columns(
+            MASS_FIRST
+                .map(|kind| Parameter { kind, index: link })
+                .to_vec(),
+        ),
         extra: Vec::new(),
     }
 }

@@ -14,21 +14,26 @@ pub(crate) fn of_predictions(predictions: &[Prediction], robot: &Robot) -> Vec<N
     let joints = robot.joints().iter().enumerate();
     joints
         .map(|(j, joint)| {
-            let runs: Vec<TorqueRun> = predictions
-                .iter()
-                .map(|p| TorqueRun {
-                    part: if p.training {
-                        Part::Training
-                    } else {
-                        Part::Validation
-                    },
-                    time: &p.time,
-                    measured: &p.measured[j],
-                    predicted: &p.predicted[j],
-                })
-                .collect();
+            let runs = torque_runs(predictions, j);
             let name = format!("torque-{}-{}.svg", j + 1, file_name(&joint.name));
             (name, torque_plot(&joint.name, joint.kind, &runs))
+        })
+        .collect()
+}
+
+/// Torque of one joint in each stretch of the logs.
+pub(crate) fn torque_runs(predictions: &[Prediction], joint: usize) -> Vec<TorqueRun<'_>> {
+    predictions
+        .iter()
+        .map(|p| TorqueRun {
+            part: if p.training {
+                Part::Training
+            } else {
+                Part::Validation
+            },
+            time: &p.time,
+            measured: &p.measured[joint],
+            predicted: &p.predicted[joint],
         })
         .collect()
 }

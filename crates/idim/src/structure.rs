@@ -205,27 +205,29 @@ impl Structure {
     }
 }
 
+/// Mass first: what is not felt of a link keeps its mass and first moments.
+pub(crate) const MASS_FIRST: [ParameterKind; 10] = {
+    use ParameterKind as K;
+    [
+        K::M,
+        K::MX,
+        K::MY,
+        K::MZ,
+        K::XX,
+        K::YY,
+        K::ZZ,
+        K::XY,
+        K::XZ,
+        K::YZ,
+    ]
+};
+
 fn keep_positions(columns: &Columns, order: KeepOrder) -> Vec<usize> {
     let mut positions: Vec<usize> = (0..columns.len()).collect();
     if order == KeepOrder::MassFirst {
-        use ParameterKind as K;
-        let rank = |kind| {
-            [
-                K::M,
-                K::MX,
-                K::MY,
-                K::MZ,
-                K::XX,
-                K::YY,
-                K::ZZ,
-                K::XY,
-                K::XZ,
-                K::YZ,
-            ]
-            .iter()
-            .position(|&k| k == kind)
-            .unwrap_or(10)
-        };
+        let rank = |kind| MASS_FIRST.iter().position(|&k| k == kind);
+        // Drive columns, which have no place among the ten, come last.
+        let rank = |kind| rank(kind).unwrap_or(MASS_FIRST.len());
         positions.sort_by_key(|&k| (columns.0[k].index, rank(columns.0[k].kind), k));
     }
     positions

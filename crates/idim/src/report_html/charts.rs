@@ -1,7 +1,8 @@
 //! The curves of the page as numbers in JSON, thinned to what an eye can use.
 
 use super::data::{CutoffCurve, ReportData, Spectrum, drive_words, position_unit};
-use crate::plot::{Part, TorqueRun, side_by_side};
+use crate::plot::{Part, side_by_side};
+use crate::plots::torque_runs;
 use serde::Serialize;
 
 /// Samples drawn over all joints; more are thinned. Three curves at some four bytes a number make two megabytes.
@@ -91,20 +92,7 @@ impl Coded {
 /// Measured and predicted torque of one joint, the residual below.
 pub(super) fn torque_chart(data: &ReportData, joint: usize) -> Chart {
     let (quantity, unit) = drive_words(data.robot.joints()[joint].kind);
-    let runs: Vec<TorqueRun> = data
-        .predictions
-        .iter()
-        .map(|p| TorqueRun {
-            part: if p.training {
-                Part::Training
-            } else {
-                Part::Validation
-            },
-            time: &p.time,
-            measured: &p.measured[joint],
-            predicted: &p.predicted[joint],
-        })
-        .collect();
+    let runs = torque_runs(data.predictions, joint);
     let (times, shifted) = side_by_side(&runs);
     let total: usize = runs.iter().map(|r| r.time.len()).sum();
     let budget = SAMPLES / data.robot.n_joints();
