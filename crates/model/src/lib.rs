@@ -71,8 +71,8 @@ pub use regressor::{
     torque_regressor_into, visit_torque_regressor,
 };
 pub use robot::{
-    Actuator, Capsule, Coupling, Drives, Joint, JointKind, JointLimits, KnownTorque, Link,
-    LinkCapsule, LogSide, Robot, Shapes,
+    Actuator, Capsule, Coupling, Drives, Formula, Function, Joint, JointKind, JointLimits,
+    KnownTorque, Link, LinkCapsule, LogSide, Operation, Robot, Shapes,
 };
 pub use robot_file::{robot_from_ron, robot_to_ron};
 pub use states::{JointState, JointStates, random_states};

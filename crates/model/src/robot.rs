@@ -8,10 +8,12 @@ use nalgebra::Vector3;
 
 mod check;
 mod drives;
+mod formula;
 mod known_torque;
 mod shapes;
 
 pub use drives::{Coupling, Drives, LogSide};
+pub use formula::{Formula, Function, Operation};
 pub use known_torque::KnownTorque;
 pub use shapes::{Capsule, LinkCapsule, Shapes};
 

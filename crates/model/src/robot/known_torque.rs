@@ -1,7 +1,7 @@
 //! Torques known by their shape over the joint's coordinate: springs and counterbalances.
 
+use super::formula::Formula;
 use crate::error::Error;
-use exmex::{Express, FlatEx};
 
 /// The variable that stands for the joint's coordinate in a formula.
 const COORDINATE: &str = "q";
@@ -28,9 +28,8 @@ enum Curve {
 struct Step {
     name: String,
     text: String,
-    expression: FlatEx<f64>,
-    /// Where the variables stand among `q` and the steps before.
-    inputs: Vec<usize>,
+    /// Of `q` and the steps before.
+    formula: Formula,
 }
 
 impl KnownTorque {
@@ -93,26 +92,12 @@ impl KnownTorque {
                 let rule = "q is the joint's coordinate; give each quantity a name of its own";
                 return Err(Error::robot(place, "a name given twice", rule));
             }
-            let expression = exmex::parse::<f64>(text).map_err(|e| {
-                let rule = "write it with + - * / ^, brackets, PI, sin, cos, sqrt and so on";
-                Error::robot(&place, format!("`{text}` is no formula: {e}"), rule)
-            })?;
-            let mut inputs = Vec::new();
-            for variable in expression.var_names() {
-                let Some(at) = known.iter().position(|k| k == variable) else {
-                    return Err(Error::robot(
-                        place,
-                        format!("`{variable}` is not known here"),
-                        format!("a formula may use {}", known.join(", ")),
-                    ));
-                };
-                inputs.push(at);
-            }
+            let formula = Formula::parse(text, &known)
+                .map_err(|(met, rule)| Error::robot(place, met, rule))?;
             steps.push(Step {
                 name: quantity.clone(),
                 text: text.clone(),
-                expression,
-                inputs,
+                formula,
             });
         }
         Ok(Self {
@@ -155,12 +140,10 @@ impl KnownTorque {
                 t0 + (t1 - t0) * (q - q0) / (q1 - q0)
             }
             Curve::Formula { steps } => {
-                let mut values = vec![q];
-                let mut arguments = Vec::new();
+                let mut values = Vec::with_capacity(steps.len() + 1);
+                values.push(q);
                 for step in steps {
-                    arguments.clear();
-                    arguments.extend(step.inputs.iter().map(|&k| values[k]));
-                    values.push(step.expression.eval(&arguments).unwrap_or(f64::NAN));
+                    values.push(step.formula.at(&values));
                 }
                 values.last().copied().unwrap_or(f64::NAN)
             }
@@ -185,5 +168,50 @@ impl KnownTorque {
             .iter()
             .map(|s| (s.name.as_str(), s.text.as_str()));
         Some((pairs.collect(), torque.text.as_str()))
+    }
+
+    /// The named quantities and, without a name, the torque: each a formula of `q` (place 0) and of those before it
+    /// (places from 1); `None` for a table.
+    pub fn steps(&self) -> Option<Vec<(&str, &Formula)>> {
+        match &self.curve {
+            Curve::Table(_) => None,
+            Curve::Formula { steps } => Some(
+                steps
+                    .iter()
+                    .map(|s| (s.name.as_str(), &s.formula))
+                    .collect(),
+            ),
+        }
+    }
+
+    /// The torque whose scale of 1 is this one's of `scale`.
+    ///
+    /// # Errors
+    /// A scale that is not finite; a formula that grows too long.
+    pub fn scaled(&self, scale: f64) -> Result<Self, Error> {
+        if !scale.is_finite() {
+            let place = format!("known torque {}", self.name);
+            return Err(Error::robot(
+                place,
+                format!("a scale of {scale}"),
+                "give a finite number",
+            ));
+        }
+        match &self.curve {
+            Curve::Table(points) => {
+                let scaled = points.iter().map(|&[q, torque]| [q, scale * torque]);
+                Self::from_table(&self.name, self.joint, scaled.collect())
+            }
+            Curve::Formula { steps } => {
+                let mut pairs: Vec<(String, String)> = steps
+                    .iter()
+                    .map(|s| (s.name.clone(), s.text.clone()))
+                    .collect();
+                let (_, torque) = pairs.pop().unwrap_or_default();
+                // Without an exponent, which formulas do not know.
+                let torque = format!("{scale} * ({torque})");
+                Self::from_formula(&self.name, self.joint, &pairs, &torque)
+            }
+        }
     }
 }
