@@ -6,6 +6,7 @@ use crate::fit::{Fit, fit};
 use crate::friction::{self, Chosen, FrictionChoice, JointFriction, friction_of};
 use crate::identify::{IdentifyOptions, joint_names};
 use crate::plan::SamplingPlan;
+use crate::predictor::bodies;
 use crate::samples::{Stretch, rigid_torque};
 use crate::structure::Structure;
 use idim_model::{Columns, DriveColumns, ParameterKind, Robot};
@@ -197,5 +198,10 @@ impl LoadModel {
     /// The rigid body's torque on a stretch.
     pub(crate) fn know(&self, robot: &Robot, stretch: &mut Stretch) {
         stretch.load = Some(rigid_torque(robot, &self.columns, &self.values, stretch));
+    }
+
+    /// The ten of each link of that rigid body, for a predictor.
+    pub(crate) fn bodies(&self, n_links: usize) -> Vec<[f64; 10]> {
+        bodies(n_links, &self.columns.standard, &self.values)
     }
 }

@@ -55,6 +55,11 @@ const MOTOR_REVERSAL: f64 = 0.01;
 /// A prismatic joint's smoothing speed, m/s, per rad/s of a revolute one.
 pub(crate) const PRISMATIC_SPEED: f64 = 0.1;
 
+/// Speed over which a motor's Coulomb torque changes sign, where its joint's does over `reversal`.
+pub(crate) fn motor_reversal(reversal: f64) -> f64 {
+    if reversal > 0.0 { MOTOR_REVERSAL } else { 0.0 }
+}
+
 /// Sign of a speed, smoothed over `reversal`; the sign itself for 0.
 pub(crate) fn smooth_sign(speed: f64, reversal: f64) -> f64 {
     if reversal > 0.0 {
@@ -146,11 +151,7 @@ impl ExtraColumn {
                         *t += ratio * v;
                     }
                 }
-                let reversal = if reversal[*motor] > 0.0 {
-                    MOTOR_REVERSAL
-                } else {
-                    0.0
-                };
+                let reversal = motor_reversal(reversal[*motor]);
                 let value = |t: f64| match kind {
                     ParameterKind::Fc => factor * smooth_sign(t, reversal),
                     _ => factor * t,

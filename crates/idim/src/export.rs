@@ -17,25 +17,27 @@ use robot_files::{completed_ron, completed_urdf};
 
 /// Names (below the folder of the result) and texts of the files.
 ///
-/// `model/parameters.yaml`; `model/predictor.rs` and `model/predictor.c` where every column is the regressor's; with a prior also `model/robot.ron` and
+/// `model/parameters.yaml`, `model/predictor.rs` and `model/predictor.c`; with a prior also `model/robot.ron` and
 /// `model/robot.urdf`.
 pub fn exports(found: &Identification, robot: &Robot) -> Vec<(String, String)> {
     let completion = complete(found, robot);
-    let mut files = vec![(
-        "parameters.yaml",
-        parameters_yaml(found, robot, &completion),
-    )];
-    // The predictors know the regressor's columns; a model with others (coupled motors, known torques, chosen friction) has none.
-    if found.columns.extra.is_empty() {
-        let model = PredictedModel {
-            robot,
-            columns: &found.columns.standard,
-            values: &found.values,
-            reversal: &found.reversal,
-        };
-        files.push(("predictor.rs", predictor_rust(&model)));
-        files.push(("predictor.c", predictor_c(&model)));
-    }
+    let load = found.load.as_ref();
+    let load = load.map_or_else(Vec::new, |l| l.bodies(robot.n_joints()));
+    let model = PredictedModel {
+        robot,
+        columns: &found.columns,
+        values: &found.values,
+        reversal: &found.reversal,
+        load: &load,
+    };
+    let mut files = vec![
+        (
+            "parameters.yaml",
+            parameters_yaml(found, robot, &completion),
+        ),
+        ("predictor.rs", predictor_rust(&model)),
+        ("predictor.c", predictor_c(&model)),
+    ];
     if let Ok(completion) = &completion {
         files.push(("robot.ron", completed_ron(robot, completion)));
         files.push(("robot.urdf", completed_urdf(robot, completion)));
