@@ -20,7 +20,10 @@ use robot_files::{completed_ron, completed_urdf};
 /// `model/parameters.yaml`, `model/predictor.rs` and `model/predictor.c`; with a prior also `model/robot.ron` and
 /// `model/robot.urdf`.
 pub fn exports(found: &Identification, robot: &Robot) -> Vec<(String, String)> {
-    let completion = complete(found, robot);
+    let completed = complete(found, robot).and_then(|completion| {
+        let ron = completed_ron(robot, &completion).map_err(|e| e.to_string())?;
+        Ok((completion, ron))
+    });
     let load = found.load.as_ref();
     let load = load.map_or_else(Vec::new, |l| l.bodies(robot.n_joints()));
     let model = PredictedModel {
@@ -33,14 +36,14 @@ pub fn exports(found: &Identification, robot: &Robot) -> Vec<(String, String)> {
     let mut files = vec![
         (
             "parameters.yaml",
-            parameters_yaml(found, robot, &completion),
+            parameters_yaml(found, robot, completed.as_ref().map(|c| &c.0)),
         ),
         ("predictor.rs", predictor_rust(&model)),
         ("predictor.c", predictor_c(&model)),
     ];
-    if let Ok(completion) = &completion {
-        files.push(("robot.ron", completed_ron(robot, completion)));
-        files.push(("robot.urdf", completed_urdf(robot, completion)));
+    if let Ok((completion, ron)) = completed {
+        files.push(("robot.ron", ron));
+        files.push(("robot.urdf", completed_urdf(robot, &completion)));
     }
     let named = files.into_iter();
     named

@@ -20,6 +20,7 @@ mod identify;
 mod load;
 mod log_spec;
 mod logs;
+mod meaning;
 mod noise_study;
 mod output;
 mod papers;

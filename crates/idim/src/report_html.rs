@@ -13,7 +13,6 @@ mod sections;
 mod spectrum;
 mod verdict;
 
-pub(crate) use data::parameter_unit;
 pub use data::{CutoffCurve, LogSummary, ReportData, ReportTable, ReportedFinding, Spectrum};
 pub(crate) use fill::{file_settings, page_of_logs, page_of_paper, shell_line, summaries};
 

@@ -1,13 +1,17 @@
 //! A robot of real bodies from base parameters and a prior.
 
+use crate::columns::ExtraColumn;
 use crate::identify::Identification;
-use crate::structure::Structure;
 use idim_estimation::{
-    ConsistencyOptions, InformationFactor, LinkPrior, PhysicalEstimate, PhysicalProblem,
-    PositivePrior, physically_consistent,
+    ConsistencyOptions, InformationFactor, LinkPrior, PhysicalEstimate, PhysicalParameters,
+    PhysicalProblem, PositivePrior, physically_consistent,
 };
-use idim_model::{InertialParameters, ParameterKind, Robot};
+use idim_model::{InertialParameters, KnownTorque, Parameter, ParameterKind, Robot};
 use nalgebra::DMatrix;
+
+mod columns;
+
+use columns::Described;
 
 /// Where a value comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,11 +42,23 @@ pub struct Completion {
     pub links: Vec<InertialParameters>,
     /// Sources of the ten, link by link.
     pub sources: Vec<[Source; 10]>,
-    /// `Ia`, `Fv` and `Fc` of each joint where the model has them, SI, at the joint.
-    pub drives: Vec<[Option<f64>; 3]>,
+    /// `Ia`, `Fv`, `Fc` and offset of each joint where the model has them, SI, at the joint.
+    pub drives: Vec<[Option<(f64, Source)>; 4]>,
+    /// What coupled motors, known torques and further friction add, SI.
+    pub extra: Vec<(ExtraColumn, f64, Source)>,
+    /// The known torques of the robot file with their scales in them: a scale of 1 is that of this robot.
+    pub known_torques: Vec<KnownTorque>,
     /// The stated uncertainty had to be widened by this factor to admit real bodies; 1 where it admits them as it is.
     pub widened: f64,
 }
+
+/// Kinds of [`Completion::drives`], in their order.
+pub(crate) const DRIVE_KINDS: [ParameterKind; 4] = [
+    ParameterKind::Ia,
+    ParameterKind::Fv,
+    ParameterKind::Fc,
+    ParameterKind::Offset,
+];
 
 /// Belief in a positive drive parameter that neither file nor data state, SI: small beside any arm's.
 const SMALL: f64 = 1e-3;
@@ -54,31 +70,58 @@ const ROOM: f64 = 2.0;
 /// # Errors
 /// Why there is none, in a sentence: no prior, a prior that no rigid body has, data that do not excite every parameter.
 pub fn complete(found: &Identification, robot: &Robot) -> Result<Completion, String> {
-    let structure = &found.structure;
-    if found.columns != structure.base_model_columns() || !structure.extra.is_empty() {
-        return Err("the log does not excite every base parameter".into());
-    }
+    let described = Described::of(found)?;
     let priors = robot.links().iter().map(|l| l.inertial.ok_or(&l.name));
     let priors: Vec<InertialParameters> = priors
         .collect::<Result<_, _>>()
         .map_err(|link| format!("no prior: the robot file states no inertial values for {link}"))?;
     let factor = factor_of_estimate(found).ok_or("the covariance of the estimate is singular")?;
+    let place = |kind, index| described.place(&Parameter { kind, index });
     let links: Vec<LinkPrior> = (0..robot.n_joints())
         .map(|j| LinkPrior {
-            columns: std::array::from_fn(|k| {
-                column(structure, ParameterKind::INERTIAL[k], j).unwrap_or_default()
-            }),
+            columns: ParameterKind::INERTIAL.map(|kind| place(kind, j).unwrap_or_default()),
             prior: priors[j],
         })
         .collect();
-    let positive = positive_priors(found, robot);
+    let positive = positive_priors(&described, found, robot);
+    let (plausible, widened) = plausible(&described, &factor, &links, &positive)?;
+    let value = |c: usize| (plausible.standard[c], described.source(c));
+    let extra: Vec<(ExtraColumn, f64, Source)> = described
+        .extra()
+        .map(|(c, column)| (column.clone(), value(c).0, value(c).1))
+        .collect();
+    Ok(Completion {
+        sources: (0..robot.n_joints())
+            .map(|j| {
+                let source = |kind| place(kind, j).map_or(Source::Prior, |c| described.source(c));
+                ParameterKind::INERTIAL.map(source)
+            })
+            .collect(),
+        drives: (0..robot.n_joints())
+            .map(|j| DRIVE_KINDS.map(|kind| place(kind, j).map(value)))
+            .collect(),
+        known_torques: known_torques(robot, &extra)?,
+        extra,
+        links: plausible.links,
+        widened,
+    })
+}
+
+/// The most plausible robot, and how far the uncertainty had to be widened to hold one.
+fn plausible(
+    described: &Described,
+    factor: &InformationFactor,
+    links: &[LinkPrior],
+    positive: &[PositivePrior],
+) -> Result<(PhysicalParameters, f64), String> {
+    let regrouping = described.regrouping();
     let solve = |sigma: f64| -> Result<PhysicalEstimate, String> {
         let problem = PhysicalProblem {
-            factor: &factor,
+            factor,
             sigma,
-            regrouping: structure.reduction.regrouping.as_ref(),
-            links: &links,
-            positive: &positive,
+            regrouping: regrouping.as_ref(),
+            links,
+            positive,
         };
         physically_consistent(&problem, &ConsistencyOptions::default()).map_err(|e| e.to_string())
     };
@@ -86,49 +129,31 @@ pub fn complete(found: &Identification, robot: &Robot) -> Result<Completion, Str
     let mut outcome = solve(widened)?;
     if outcome.most_plausible.is_none() {
         // The median of χ² is about its degrees of freedom.
-        let freedom = found.columns.len() as f64;
+        let freedom = regrouping.nrows() as f64;
         widened = (ROOM * outcome.closest.delta_chi_square / freedom)
             .sqrt()
             .max(1.0);
         outcome = solve(widened)?;
     }
-    let plausible = outcome
-        .most_plausible
-        .ok_or("no robot of real bodies is near the data")?;
-    Ok(Completion {
-        sources: (0..robot.n_joints())
-            .map(|j| sources(structure, j))
-            .collect(),
-        drives: (0..robot.n_joints())
-            .map(|j| {
-                [ParameterKind::Ia, ParameterKind::Fv, ParameterKind::Fc]
-                    .map(|kind| Some(plausible.standard[column(structure, kind, j)?]))
-            })
-            .collect(),
-        links: plausible.links,
+    let found = outcome.most_plausible;
+    Ok((
+        found.ok_or("no robot of real bodies is near the data")?,
         widened,
-    })
+    ))
 }
 
-/// Position of a parameter among all columns.
-fn column(structure: &Structure, kind: ParameterKind, index: usize) -> Option<usize> {
-    structure
-        .columns
-        .0
-        .iter()
-        .position(|p| p.kind == kind && p.index == index)
-}
-
-fn sources(structure: &Structure, link: usize) -> [Source; 10] {
-    let r = &structure.reduction;
-    std::array::from_fn(
-        |k| match column(structure, ParameterKind::INERTIAL[k], link) {
-            Some(c) if r.unidentifiable.contains(&c) => Source::Prior,
-            Some(c) if r.identifiable_alone.contains(&c) => Source::Data,
-            Some(_) => Source::Combination,
-            None => Source::Prior,
-        },
-    )
+/// The file's known torques with their scales in them.
+fn known_torques(
+    robot: &Robot,
+    extra: &[(ExtraColumn, f64, Source)],
+) -> Result<Vec<KnownTorque>, String> {
+    let scale = |torque: &KnownTorque| {
+        let own = |e: &ExtraColumn| matches!(e, ExtraColumn::Known(k) if k == torque);
+        extra.iter().find(|(e, ..)| own(e)).map_or(1.0, |e| e.1)
+    };
+    let all = robot.drives().known_torques.iter();
+    all.map(|k| k.scaled(scale(k)).map_err(|e| e.to_string()))
+        .collect()
 }
 
 /// Rows that say of the base parameters what the estimate says: `A β = A β̂` with `AᵀA = C⁻¹`.
@@ -146,22 +171,48 @@ fn factor_of_estimate(found: &Identification) -> Option<InformationFactor> {
     Some(factor)
 }
 
-/// What was believed of rotors and friction: the file's word, else the data's.
-fn positive_priors(found: &Identification, robot: &Robot) -> Vec<PositivePrior> {
-    let structure = &found.structure;
-    let mut priors = Vec::new();
-    for (c, p) in structure.columns.0.iter().enumerate() {
+/// What was believed of rotors, friction and known torques: the file's word, else the data's.
+///
+/// A joint with further friction terms may have a viscous or Coulomb share below zero; the rotor of a coupled motor is the
+/// motor's, so that nothing is stated of what its joint has beside it.
+fn positive_priors(
+    described: &Described,
+    found: &Identification,
+    robot: &Robot,
+) -> Vec<PositivePrior> {
+    let rotor = |j: usize| {
+        let a = &robot.joints()[j].actuator;
+        a.rotor_inertia.zip(a.gear_ratio).map(|(i, g)| i * g * g)
+    };
+    let coupled = |j: usize| {
+        let of = |e: &ExtraColumn| matches!(e, ExtraColumn::Motor { motor, .. } if *motor == j);
+        found.structure.extra.iter().any(of)
+    };
+    let standard = described.standard().filter_map(|(c, p)| {
         let a = &robot.joints()[p.index].actuator;
+        let free = described.has_further_friction(p.index);
         let stated = match p.kind {
-            ParameterKind::Ia => a.rotor_inertia.zip(a.gear_ratio).map(|(i, g)| i * g * g),
-            ParameterKind::Fv => a.viscous_friction,
-            ParameterKind::Fc => a.coulomb_friction,
-            _ => continue,
+            ParameterKind::Ia if coupled(p.index) => None,
+            ParameterKind::Ia => rotor(p.index),
+            ParameterKind::Fv if !free => a.viscous_friction,
+            ParameterKind::Fc if !free => a.coulomb_friction,
+            _ => return None,
         };
-        let base = structure.reduction.base.iter().position(|&b| b == c);
-        let estimated = base.map(|b| found.values[b]);
+        Some((c, stated))
+    });
+    let extra = described.extra().filter_map(|(c, column)| match column {
+        ExtraColumn::Motor { motor, kind, .. } => {
+            let stated = (*kind == ParameterKind::Ia).then(|| rotor(*motor));
+            Some((c, stated.flatten()))
+        }
+        // A torque whose scale is in a combination only is as described.
+        ExtraColumn::Known(_) if described.estimated(c).is_none() => Some((c, Some(1.0))),
+        _ => None,
+    });
+    let prior = |(column, stated): (usize, Option<f64>)| {
+        let estimated = described.estimated(column).map(|k| found.values[k]);
         let prior = stated.or(estimated).filter(|v| *v > 0.0).unwrap_or(SMALL);
-        priors.push(PositivePrior { column: c, prior });
-    }
-    priors
+        PositivePrior { column, prior }
+    };
+    standard.chain(extra).map(prior).collect()
 }

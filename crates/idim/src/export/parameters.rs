@@ -1,9 +1,9 @@
 //! `parameters.yaml`: base parameters with relations and uncertainty, drives, and completed links.
 
-use super::completion::Completion;
+use super::completion::{Completion, DRIVE_KINDS, Source};
 use crate::identify::Identification;
-use crate::report_html::parameter_unit;
-use idim_model::{ParameterKind, Robot};
+use crate::meaning::parameter_unit;
+use idim_model::{Notation, ParameterKind, Robot};
 use serde::Serialize;
 
 /// Name of the schema.
@@ -17,6 +17,8 @@ struct File<'a> {
     gravity: [f64; 3],
     base_parameters: Vec<Base<'a>>,
     joints: Vec<Drive<'a>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    extra_parameters: Vec<Extra>,
     completed: Completed<'a>,
 }
 
@@ -45,12 +47,25 @@ struct Drive<'a> {
     reversal_speed: f64,
 }
 
+/// A parameter beside those of bodies and joints: of coupled motors, known torques, further friction.
+#[derive(Serialize)]
+struct Extra {
+    name: String,
+    value: f64,
+    std: f64,
+    unit: &'static str,
+    meaning: String,
+}
+
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Completed<'a> {
     Links {
         uncertainty_widened: f64,
         links: Vec<Link<'a>>,
+        drives: Vec<Sourced>,
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        extra: Vec<Sourced>,
     },
     Not {
         none_because: &'a str,
@@ -73,7 +88,7 @@ struct Sourced {
 pub(super) fn parameters_yaml(
     found: &Identification,
     robot: &Robot,
-    completion: &Result<Completion, String>,
+    completion: Result<&Completion, &String>,
 ) -> String {
     let r = &found.result;
     let estimated = r.estimate.as_ref().map_or(&[][..], |e| &e.parameters);
@@ -92,6 +107,12 @@ pub(super) fn parameters_yaml(
         Ok(c) => Completed::Links {
             uncertainty_widened: c.widened,
             links: (0..robot.n_joints()).map(|j| link(robot, c, j)).collect(),
+            drives: completed_drives(c),
+            extra: c
+                .extra
+                .iter()
+                .map(|(column, value, source)| sourced(column.name(), *value, *source))
+                .collect(),
         },
         Err(why) => Completed::Not { none_because: why },
     };
@@ -104,6 +125,7 @@ pub(super) fn parameters_yaml(
         joints: (0..robot.n_joints())
             .map(|j| drive(found, robot, j))
             .collect(),
+        extra_parameters: extra_parameters(found, robot),
         completed,
     };
     serde_saphyr::to_string(&file).expect("plain structs of numbers and strings have a YAML form")
@@ -127,16 +149,50 @@ fn drive<'a>(found: &Identification, robot: &'a Robot, joint: usize) -> Drive<'a
     }
 }
 
+fn extra_parameters(found: &Identification, robot: &Robot) -> Vec<Extra> {
+    let first = found.columns.standard.len();
+    let all = found.columns.extra.iter().enumerate();
+    all.map(|(k, column)| {
+        let (name, k) = (column.name(), first + k);
+        Extra {
+            value: found.values[k],
+            std: found.covariance[(k, k)].sqrt(),
+            unit: parameter_unit(&name, robot),
+            meaning: column.meaning(robot),
+            name,
+        }
+    })
+    .collect()
+}
+
+fn completed_drives(c: &Completion) -> Vec<Sourced> {
+    let joints = c.drives.iter().enumerate();
+    let all = joints.flat_map(|(index, drives)| {
+        DRIVE_KINDS
+            .iter()
+            .zip(drives)
+            .filter_map(move |(&kind, value)| {
+                let name = idim_model::Parameter { kind, index }.name(Notation::Gautier);
+                value.map(|(value, source)| sourced(name, value, source))
+            })
+    });
+    all.collect()
+}
+
+fn sourced(name: String, value: f64, source: Source) -> Sourced {
+    Sourced {
+        name,
+        value,
+        source: source.word(),
+    }
+}
+
 fn link<'a>(robot: &'a Robot, c: &Completion, j: usize) -> Link<'a> {
     let ten = ParameterKind::INERTIAL.iter().enumerate();
     Link {
         link: &robot.links()[j].name,
         parameters: ten
-            .map(|(k, kind)| Sourced {
-                name: format!("{kind:?}"),
-                value: c.links[j].0[k],
-                source: c.sources[j][k].word(),
-            })
+            .map(|(k, kind)| sourced(format!("{kind:?}"), c.links[j].0[k], c.sources[j][k]))
             .collect(),
     }
 }

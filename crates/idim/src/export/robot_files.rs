@@ -1,13 +1,20 @@
 //! Completed robots as robot files: RON in this program's own format, and URDF.
 
-use super::completion::{Completion, Source};
+use super::completion::{Completion, DRIVE_KINDS, Source};
+use crate::columns::ExtraColumn;
+use crate::meaning::parameter_unit;
 use askama::Template;
-use idim_model::{Joint, JointKind, Link, ParameterKind, Pose, Robot, robot_to_ron};
+use idim_model::{
+    Drives, Joint, JointKind, Link, Notation, Parameter, ParameterKind, Pose, Robot, robot_to_ron,
+};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write as _;
 
 /// The robot with the completed values as its own.
-pub(super) fn completed_ron(robot: &Robot, c: &Completion) -> String {
+///
+/// # Errors
+/// What a robot file cannot hold.
+pub(super) fn completed_ron(robot: &Robot, c: &Completion) -> Result<String, idim_model::Error> {
     let mut text = format!(
         "// Identified by idim {}: inertia completed by the prior of the robot file.\n// Where each value comes from: data (known for itself), combination (the data fix a sum it stands in), prior.\n",
         env!("CARGO_PKG_VERSION")
@@ -15,10 +22,48 @@ pub(super) fn completed_ron(robot: &Robot, c: &Completion) -> String {
     for (link, sources) in robot.links().iter().zip(&c.sources) {
         let _ = writeln!(text, "// {}: {}", one_line(&link.name), words(sources));
     }
-    text + &robot_to_ron(&completed(robot, c)) + "\n"
+    for line in beside(robot, c) {
+        let _ = writeln!(text, "// {}", one_line(&line));
+    }
+    Ok(text + &robot_to_ron(&completed(robot, c)?) + "\n")
 }
 
-fn completed(robot: &Robot, c: &Completion) -> Robot {
+/// Drives and everything else beside the bodies, a line each: a robot file holds only part of it.
+fn beside(robot: &Robot, c: &Completion) -> Vec<String> {
+    let mut lines = vec!["Drives, at the joint, SI:".to_owned()];
+    for (j, (joint, drives)) in robot.joints().iter().zip(&c.drives).enumerate() {
+        let values: Vec<String> = DRIVE_KINDS
+            .iter()
+            .zip(drives)
+            .filter_map(|(&kind, value)| {
+                let (value, source) = (*value)?;
+                let name = Parameter { kind, index: j }.name(Notation::Gautier);
+                let unit = parameter_unit(&name, robot);
+                Some(format!("{name} {value} {unit} ({})", source.word()))
+            })
+            .collect();
+        if !values.is_empty() {
+            lines.push(format!("  {}: {}", joint.name, values.join(", ")));
+        }
+    }
+    lines.extend(c.extra.iter().map(|(column, value, source)| {
+        let name = column.name();
+        let unit = parameter_unit(&name, robot);
+        let within = match column {
+            ExtraColumn::Known(_) => "; the robot below has it in its known torque",
+            _ => "",
+        };
+        format!(
+            "  {name} {value} {unit} ({}): {}{within}",
+            source.word(),
+            column.meaning(robot)
+        )
+    }));
+    lines
+}
+
+/// Rotors and positive friction of the joints go into their actuators, scales into the known torques.
+fn completed(robot: &Robot, c: &Completion) -> Result<Robot, idim_model::Error> {
     let links = robot.links().iter().zip(&c.links);
     let links: Vec<Link> = links
         .map(|(l, &inertial)| Link {
@@ -26,23 +71,35 @@ fn completed(robot: &Robot, c: &Completion) -> Robot {
             inertial: Some(inertial),
         })
         .collect();
+    let motor_rotor = |j: usize| {
+        let own = |e: &ExtraColumn| matches!(e, ExtraColumn::Motor { motor, kind: ParameterKind::Ia, .. } if *motor == j);
+        c.extra.iter().find(|(e, ..)| own(e)).map(|e| e.1)
+    };
     let joints: Vec<Joint> = robot
         .joints()
         .iter()
         .zip(&c.drives)
-        .map(|(joint, [ia, fv, fc])| {
+        .enumerate()
+        .map(|(j, (joint, drives))| {
+            let [ia, fv, fc, _] = drives.map(|v| v.map(|(value, _)| value));
             let mut joint = joint.clone();
             let a = &mut joint.actuator;
-            a.viscous_friction = fv.or(a.viscous_friction);
-            a.coulomb_friction = fc.or(a.coulomb_friction);
-            let rotor = ia.zip(a.gear_ratio).map(|(ia, gear)| ia / (gear * gear));
+            a.viscous_friction = fv.filter(|v| *v >= 0.0).or(a.viscous_friction);
+            a.coulomb_friction = fc.filter(|v| *v >= 0.0).or(a.coulomb_friction);
+            // The rotor of a coupled motor is seen at its joint by a column of its own.
+            let seen = motor_rotor(j).or(ia);
+            let rotor = seen.zip(a.gear_ratio).map(|(ia, gear)| ia / (gear * gear));
             a.rotor_inertia = rotor.or(a.rotor_inertia);
             joint
         })
         .collect();
-    let same = Robot::new(robot.name(), robot.gravity(), joints, links);
-    same.and_then(|r| r.with_drives(robot.drives().clone()))
-        .expect("a checked robot with real bodies is a robot")
+    let drives = Drives {
+        known_torques: c.known_torques.clone(),
+        ..robot.drives().clone()
+    };
+    Robot::new(robot.name(), robot.gravity(), joints, links)?
+        .with_drives(drives)?
+        .with_shapes(robot.shapes().clone())
 }
 
 #[derive(Template)]
@@ -51,6 +108,7 @@ struct Urdf {
     version: &'static str,
     name: String,
     root: String,
+    beside: Vec<String>,
     joints: Vec<UrdfJoint>,
 }
 
@@ -88,6 +146,10 @@ pub(super) fn completed_urdf(robot: &Robot, c: &Completion) -> String {
             .map(|(j, joint)| urdf_joint(robot, c, j, joint, &root))
             .collect(),
         root,
+        beside: beside(robot, c)
+            .iter()
+            .map(|line| in_comment(line))
+            .collect(),
     };
     page.render().expect("a string takes any text")
 }
@@ -123,8 +185,8 @@ fn urdf_joint(robot: &Robot, c: &Completion, j: usize, joint: &Joint, root: &str
         rpy: triple(&roll_pitch_yaw(&origin.rotation)),
         axis: triple(&joint.axis),
         limit,
-        damping: c.drives[j][1].unwrap_or(0.0),
-        friction: c.drives[j][2].unwrap_or(0.0),
+        damping: c.drives[j][1].map_or(0.0, |v| v.0.max(0.0)),
+        friction: c.drives[j][2].map_or(0.0, |v| v.0.max(0.0)),
         sources: words(&c.sources[j]),
         centre: triple(&(body.first_moment() / body.mass())),
         mass: body.mass(),
@@ -148,6 +210,15 @@ fn words(sources: &[Source; 10]) -> String {
         .map(|(kind, s)| format!("{kind:?} {}", s.word()))
         .collect::<Vec<_>>()
         .join(", ")
+}
+
+/// A line inside a comment of XML, which two dashes would end.
+fn in_comment(line: &str) -> String {
+    let mut text = one_line(line);
+    while text.contains("--") {
+        text = text.replace("--", "- -");
+    }
+    text
 }
 
 /// A name in a comment or an attribute: control characters have no place there.

@@ -147,29 +147,3 @@ pub(super) fn position_unit(kind: JointKind) -> &'static str {
         JointKind::Prismatic => "m",
     }
 }
-
-/// Unit of a parameter by its name (`ZZR1`, `mx2`, `Fv3`); empty for a word that is not known.
-pub(crate) fn parameter_unit(name: &str, robot: &Robot) -> &'static str {
-    let word = name.trim_end_matches(|c: char| c.is_ascii_digit());
-    let number: Option<usize> = name[word.len()..].parse().ok();
-    let kind = number
-        .and_then(|n| robot.joints().get(n.checked_sub(1)?))
-        .map_or(JointKind::Revolute, |j| j.kind);
-    let word = word.strip_suffix('R').unwrap_or(word);
-    match (word, kind) {
-        ("Ia", JointKind::Prismatic) | ("M" | "m", _) => "kg",
-        ("MX" | "MY" | "MZ" | "mx" | "my" | "mz", _) => "kg·m",
-        ("Fv", JointKind::Revolute) => "N·m·s/rad",
-        ("Fv", JointKind::Prismatic) => "N·s/m",
-        ("Fc" | "off", kind) => drive_words(kind).1,
-        ("Ia", JointKind::Revolute) => "kg·m²",
-        (w, _) if is_inertia(w) => "kg·m²",
-        _ => "",
-    }
-}
-
-/// `XX` or `Ixx`: an entry of an inertia tensor.
-fn is_inertia(word: &str) -> bool {
-    let axes = word.strip_prefix('I').unwrap_or(word);
-    axes.len() == 2 && axes.chars().all(|c| "XYZxyz".contains(c))
-}

@@ -1,7 +1,8 @@
 //! The parameters, how sure they are, and what they are combinations of.
 
 use super::blocks::{Block, Cell, bar, figures, word};
-use super::data::{ReportData, parameter_unit};
+use super::data::ReportData;
+use crate::meaning::parameter_unit;
 use crate::result::ParameterResult;
 use crate::table::{number, optional};
 
