@@ -5,8 +5,10 @@ use crate::result::{FrictionResult, FrictionTrial};
 use idim_model::Robot;
 
 mod dictionary;
+mod part;
 mod search;
 
+pub use part::{FrictionPart, MotorFriction};
 pub(crate) use search::{Chosen, search};
 
 /// How the friction of the joints is modelled.

@@ -2,10 +2,10 @@
 
 use crate::baselines::baselines;
 use crate::choice::{Found, LoadModel, find};
-use crate::columns::{ExtraColumn, ModelColumns};
+use crate::columns::ModelColumns;
 use crate::error::Error;
-use crate::fit::{EstimationOptions, Fit};
-use crate::friction::{self, FrictionChoice};
+use crate::fit::EstimationOptions;
+use crate::friction::{self, FrictionChoice, FrictionPart};
 use crate::load::LoadedRobot;
 use crate::plan::{SamplingOptions, SamplingPlan};
 use crate::report_html::{LogSummary, Spectrum, summaries};
@@ -16,7 +16,7 @@ use crate::structure::Structure;
 use faer::Mat;
 use idim_estimation::ResidualStatistics;
 use idim_measurement::Measurements;
-use idim_model::{DriveColumns, ParameterKind, Robot};
+use idim_model::{DriveColumns, Robot};
 
 /// What one run is asked for.
 #[derive(Debug, Clone, Default)]
@@ -49,15 +49,6 @@ pub struct Prediction {
     pub predicted: Vec<Vec<f64>>,
     /// What of it is friction, where the model has some.
     pub friction: Option<FrictionPart>,
-}
-
-/// The friction of a predicted torque over the velocity, joint by joint.
-#[derive(Debug, Clone)]
-pub struct FrictionPart {
-    /// Velocity of the joint, rad/s (m/s).
-    pub velocity: Vec<Vec<f64>>,
-    /// Torque of everything that is neither inertia nor weight, N·m (N).
-    pub torque: Vec<Vec<f64>>,
 }
 
 /// Everything an identification from logs found.
@@ -140,7 +131,7 @@ pub fn identify(
             time: s.time.clone(),
             measured: s.torque.clone(),
             predicted: predict(robot, &fit.columns, &fit.values, s, &plan.reversal),
-            friction: Some(friction_part(robot, &fit, s, &plan)),
+            friction: Some(FrictionPart::of(robot, &fit, s, &plan)),
         })
         .collect();
     let joints = joint_names(robot);
@@ -177,28 +168,6 @@ pub fn identify(
         plan,
         load,
     })
-}
-
-/// The prediction with every inertial parameter and known torque set to zero.
-fn friction_part(robot: &Robot, fit: &Fit, stretch: &Stretch, plan: &SamplingPlan) -> FrictionPart {
-    let inertial = |k: ParameterKind| k.inertial_index().is_some() || k == ParameterKind::Ia;
-    let standard = fit.columns.standard.0.iter().map(|c| !inertial(c.kind));
-    let extra = fit.columns.extra.iter().map(|e| match e {
-        ExtraColumn::Motor { kind, .. } => !inertial(*kind),
-        ExtraColumn::Known(_) => false,
-        ExtraColumn::Friction { .. } => true,
-    });
-    let friction: Vec<f64> = standard
-        .chain(extra)
-        .zip(&fit.values)
-        .map(|(is_friction, &v)| if is_friction { v } else { 0.0 })
-        .collect();
-    FrictionPart {
-        velocity: (0..robot.n_joints())
-            .map(|j| stretch.states.qd(j).to_vec())
-            .collect(),
-        torque: predict(robot, &fit.columns, &friction, stretch, &plan.reversal),
-    }
 }
 
 /// The first part trains, the rest validates; cut before anything is filtered, so that nothing leaks.

@@ -48,10 +48,8 @@ pub use commands::{DriveGainsArgs, LoadedRuns, TorqueConstantsArgs};
 pub use drive_gains::{DriveGains, drive_gains};
 pub use error::Error;
 pub use fit::EstimationOptions;
-pub use friction::{FrictionChoice, JointFriction, parse_friction};
-pub use identify::{
-    FrictionPart, Identification, IdentifyOptions, Prediction, TRAINING_SHARE, identify,
-};
+pub use friction::{FrictionChoice, FrictionPart, JointFriction, MotorFriction, parse_friction};
+pub use identify::{Identification, IdentifyOptions, Prediction, TRAINING_SHARE, identify};
 pub use load::{Changes, LoadedRobot, load_robot};
 pub use log_spec::LogSpec;
 pub use output::write_atomically;

@@ -35,6 +35,68 @@ pub(crate) fn parameter_unit(name: &str, robot: &Robot) -> &'static str {
     }
 }
 
+/// Groups of parameters by the words of their names, and what each group is.
+const GROUPS: [(&[&str], &str); 11] = [
+    (
+        &[
+            "XX", "YY", "ZZ", "XY", "XZ", "YZ", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz",
+        ],
+        "entries of the inertia tensor about the origin of the link's frame",
+    ),
+    (
+        &["MX", "MY", "MZ", "mx", "my", "mz"],
+        "first moments, mass times centre of mass",
+    ),
+    (&["M", "m"], "mass"),
+    (&["Ia"], "rotor inertia seen at the joint"),
+    (
+        &["Fv", "Fva"],
+        "viscous friction; Fva is what differs between the directions",
+    ),
+    (&["Fc"], "Coulomb friction"),
+    (&["off"], "a constant torque"),
+    (
+        &["IaM", "FvM", "FcM"],
+        "rotor inertia, viscous and Coulomb friction of a motor that turns with several joints, seen at its own joint",
+    ),
+    (
+        &["Fcub", "Froot"],
+        "friction with the third power and with the square root of the speed",
+    ),
+    (
+        &["Fs"],
+        "what static friction has above Coulomb's (Stribeck)",
+    ),
+    (&["Fl"], "friction in proportion to the load on the gear"),
+];
+
+/// What the words of these names mean, a sentence a group.
+pub(crate) fn legend<'a>(names: impl Iterator<Item = &'a str>, robot: &Robot) -> Vec<String> {
+    let known = &robot.drives().known_torques;
+    let (mut words, mut scales) = (Vec::new(), Vec::new());
+    for name in names {
+        let word = name.trim_end_matches(|c: char| c.is_ascii_digit());
+        if known.iter().any(|k| k.name() == name) {
+            scales.push(name);
+        } else {
+            words.push(word.strip_suffix('R').unwrap_or(word));
+        }
+    }
+    let present = |(group, meaning): &(&[&str], &str)| {
+        let own = group.iter().filter(|w| words.contains(w));
+        let own: Vec<&str> = own.copied().collect();
+        (!own.is_empty()).then(|| format!("{}: {meaning}", own.join(", ")))
+    };
+    let mut legend: Vec<String> = GROUPS.iter().filter_map(present).collect();
+    if !scales.is_empty() {
+        legend.push(format!(
+            "{}: scale of a known torque; 1 is as the robot file describes it",
+            scales.join(", ")
+        ));
+    }
+    legend
+}
+
 /// `XX` or `Ixx`: an entry of an inertia tensor.
 fn is_inertia(word: &str) -> bool {
     let axes = word.strip_prefix('I').unwrap_or(word);

@@ -8,12 +8,14 @@ mod blocks;
 mod charts;
 mod data;
 mod fill;
+mod friction;
 mod parameters;
 mod sections;
 mod spectrum;
+mod torque;
 mod verdict;
 
-pub use data::{CutoffCurve, LogSummary, ReportData, ReportTable, ReportedFinding, Spectrum};
+pub use data::{CutoffCurve, LogSummary, ReportData, ReportedFinding, Spectrum};
 pub(crate) use fill::{file_settings, page_of_logs, page_of_paper, shell_line, summaries};
 
 use askama::Template;
@@ -63,18 +65,14 @@ pub fn report_html(data: &ReportData) -> String {
 fn chapters(data: &ReportData) -> Vec<Chapter> {
     let all = [
         ("paper", "Beside the paper", sections::paper(data)),
-        (
-            "torque",
-            "Measured against predicted",
-            sections::torque(data),
-        ),
+        ("torque", "Measured against predicted", torque::torque(data)),
         ("parameters", "Parameters", parameters::parameters(data)),
         (
             "identifiable",
             "What the motors can feel",
             parameters::identifiable(data),
         ),
-        ("friction", "Friction", sections::friction(data)),
+        ("friction", "Friction", friction::friction(data)),
         (
             "condition",
             "How well the motion shows the parameters",
@@ -86,7 +84,6 @@ fn chapters(data: &ReportData) -> Vec<Chapter> {
             "Findings of the log doctor",
             sections::doctor(data),
         ),
-        ("tried", "What was tried", sections::tried(data)),
         ("figures", "Motions", sections::figures(data)),
         ("robot", "Robot", sections::robot(data)),
         ("again", "To run it again", sections::again(data)),

@@ -1,8 +1,11 @@
 //! The report: one file, every picture drawn by a real browser, nothing but text from hostile names.
 #![allow(clippy::unwrap_used)]
 
-use idim::report_html::{CutoffCurve, ReportData, ReportTable, ReportedFinding, report_html};
-use idim::{Identification, IdentifyOptions, LoadedRobot, SamplingOptions, identify};
+use idim::report_html::{CutoffCurve, ReportData, ReportedFinding, report_html};
+use idim::{
+    DownWeightedResult, DroppedResult, FrictionResult, FrictionTrial, Identification,
+    IdentifyOptions, LoadedRobot, SamplingOptions, identify,
+};
 use idim_measurement::Measurements;
 use idim_model::{DriveColumns, JointState, Model, Robot, inverse_dynamics, robot_from_ron};
 use std::path::{Path, PathBuf};
@@ -101,17 +104,42 @@ fn page() -> String {
     };
     let finding = ReportedFinding {
         code: "standstill".into(),
+        severity: "error, waived",
         grave: true,
         place: HOSTILE.into(),
         met: "12 % of the samples".into(),
         rule: "leave them out with --dead-band".into(),
     };
-    let table = ReportTable {
-        title: HOSTILE.into(),
-        about: "held-out rms of each friction model".into(),
-        header: vec!["joint".into(), "Coulomb and viscous".into()],
-        rows: vec![vec![HOSTILE.into(), "0.123".into()]],
+    let trial = |terms: &str, size, rms| FrictionTrial {
+        terms: terms.into(),
+        size,
+        held_out_rms: rms,
     };
+    found.result.friction = vec![FrictionResult {
+        joint: HOSTILE.into(),
+        chosen: "viscous, coulomb".into(),
+        tried: vec![
+            trial("viscous, coulomb", 2, Some(0.123)),
+            trial("viscous, coulomb, stribeck:0.050", 3, None),
+        ],
+    }];
+    found.result.baselines[0].name = HOSTILE.into();
+    if let Some(estimate) = &mut found.result.estimate {
+        estimate.dropped = vec![DroppedResult {
+            name: HOSTILE.into(),
+            value: 0.1,
+            low: -0.2,
+            high: 0.4,
+            relative_std: None,
+        }];
+        estimate.down_weighted = vec![DownWeightedResult {
+            log: HOSTILE.into(),
+            from: 1.0,
+            to: 1.25,
+            joints: vec![2],
+            lowest_weight: 0.1,
+        }];
+    }
     report_html(&ReportData {
         result: &found.result,
         robot: &robot,
@@ -120,7 +148,6 @@ fn page() -> String {
         spectrum: Some(&found.spectrum),
         cutoff: Some(&cutoff),
         findings: Some(&[finding]),
-        tables: &[table],
         figures: &[],
         paper: None,
         command: "idim identify --robot arm.ron --log run.csv",
@@ -139,6 +166,23 @@ fn regress_hostile_names_stay_text() {
         page.contains("&lt;img src=x") || page.contains("&#60;img src=x"),
         "the name itself is lost"
     );
+}
+
+#[test]
+fn regress_what_was_tried_and_left_out_is_shown() {
+    let page = page();
+    for words in [
+        "stribeck:0.050",
+        "taken",
+        "gravity alone, as identified",
+        "as identified, torques filtered as for the fit",
+        "Left out because the residual does not miss them",
+        "Spans that lost their say",
+        "error, waived",
+        "Ia: rotor inertia seen at the joint",
+    ] {
+        assert!(page.contains(words), "`{words}` is not in the page");
+    }
 }
 
 #[test]

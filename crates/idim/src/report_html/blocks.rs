@@ -15,6 +15,8 @@ pub(super) enum Block {
     Text(String),
     /// A remark in a softer colour.
     Soft(String),
+    /// How to use the page: not printed.
+    Hint(&'static str),
     Heading(String),
     Code(String),
     List(Vec<String>),

@@ -1,6 +1,7 @@
 //! The curves of the page as numbers in JSON, thinned to what an eye can use.
 
 use super::data::{CutoffCurve, ReportData, Spectrum, drive_words, position_unit};
+use crate::friction::FrictionPart;
 use crate::plot::{Part, side_by_side};
 use crate::plots::torque_runs;
 use serde::Serialize;
@@ -21,6 +22,8 @@ pub(super) struct Chart {
     /// Charts of one link are zoomed together.
     #[serde(skip_serializing_if = "Option::is_none")]
     link: Option<&'static str>,
+    /// Whether the axis is logarithmic: `x` then has logarithms to base 10.
+    x_log: bool,
     /// Room on both sides, as a share of the range.
     pad: f64,
     /// What the curves stand over; each names one by its position.
@@ -34,9 +37,17 @@ struct Panel {
     log: bool,
     height: u32,
     series: Vec<Series>,
-    /// Held-out spans of the axis.
-    bands: Vec<[f64; 2]>,
+    /// Spans of the axis: runs that trained, runs that were held out.
+    spans: Vec<Span>,
     marks: Vec<Mark>,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct Span {
+    from: f64,
+    to: f64,
+    label: &'static str,
+    shaded: bool,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -99,7 +110,7 @@ pub(super) fn torque_chart(data: &ReportData, joint: usize) -> Chart {
     let mut x = Vec::new();
     let mut upper = Vec::new();
     let mut lower = Vec::new();
-    let mut bands = Vec::new();
+    let mut spans = Vec::new();
     for (run, time) in runs.iter().zip(&times) {
         let residual: Vec<f64> = run
             .measured
@@ -126,8 +137,15 @@ pub(super) fn torque_chart(data: &ReportData, joint: usize) -> Chart {
         upper.push(line("predicted", "b", run.predicted));
         lower.push(line("residual", "c", &residual));
         x.push(pick(time, TIME_LEVELS));
-        if let (Part::Validation, Some(&a), Some(&b)) = (run.part, time.first(), time.last()) {
-            bands.push([a, b]);
+        if let (Some(&from), Some(&to)) = (time.first(), time.last()) {
+            let shaded = run.part == Part::Validation;
+            let label = if shaded { "held out" } else { "training" };
+            spans.push(Span {
+                from,
+                to,
+                label,
+                shaded,
+            });
         }
     }
     let panel = |y_label, height, series| Panel {
@@ -135,7 +153,7 @@ pub(super) fn torque_chart(data: &ReportData, joint: usize) -> Chart {
         log: false,
         height,
         series,
-        bands: bands.clone(),
+        spans: spans.clone(),
         marks: Vec::new(),
     };
     Chart {
@@ -145,6 +163,7 @@ pub(super) fn torque_chart(data: &ReportData, joint: usize) -> Chart {
             "time / s".into()
         },
         link: Some("time"),
+        x_log: false,
         pad: 0.0,
         x,
         panels: vec![
@@ -190,8 +209,31 @@ fn thin(curves: &[&[f64]], most: usize) -> Vec<usize> {
 
 /// Friction of one joint over its velocity: what the model leaves for friction, and the friction it has.
 pub(super) fn friction_chart(data: &ReportData, joint: usize) -> Option<Chart> {
-    let kind = data.robot.joints()[joint].kind;
-    let (quantity, unit) = drive_words(kind);
+    let unit = position_unit(data.robot.joints()[joint].kind);
+    let label = format!("velocity / ({unit}/s)");
+    over_velocity(data, joint, label, |f| {
+        Some((&f.velocity[joint], &f.torque[joint]))
+    })
+}
+
+/// The same of a motor that turns with several joints, over its own velocity.
+pub(super) fn motor_friction_chart(data: &ReportData, motor: usize) -> Option<Chart> {
+    let unit = position_unit(data.robot.joints()[motor].kind);
+    let label = format!("velocity of the motor over its gear ratio / ({unit}/s)");
+    over_velocity(data, motor, label, |f| {
+        let own = f.motors.iter().find(|m| m.motor == motor)?;
+        Some((&own.velocity, &own.torque))
+    })
+}
+
+/// A friction over the velocity it depends on, and what the residual of a joint adds to it.
+fn over_velocity<'a>(
+    data: &ReportData<'a>,
+    joint: usize,
+    x_label: String,
+    of: impl Fn(&'a FrictionPart) -> Option<(&'a Vec<f64>, &'a Vec<f64>)>,
+) -> Option<Chart> {
+    let (quantity, unit) = drive_words(data.robot.joints()[joint].kind);
     let total: usize = data
         .predictions
         .iter()
@@ -201,14 +243,14 @@ pub(super) fn friction_chart(data: &ReportData, joint: usize) -> Option<Chart> {
     let every = total.div_ceil(DOTS).max(1);
     let (mut velocity, mut seen, mut model) = (Vec::new(), Vec::new(), Vec::new());
     for p in data.predictions {
-        let Some(friction) = &p.friction else {
+        let Some((speed, friction)) = p.friction.as_ref().and_then(&of) else {
             continue;
         };
         for k in (0..p.time.len()).step_by(every) {
-            let f = friction.torque[joint][k];
+            let f = friction[k];
             let left = p.measured[joint][k] - p.predicted[joint][k] + f;
             if left.is_finite() && f.is_finite() {
-                velocity.push(friction.velocity[joint][k]);
+                velocity.push(speed[k]);
                 seen.push(left);
                 model.push(f);
             }
@@ -222,8 +264,9 @@ pub(super) fn friction_chart(data: &ReportData, joint: usize) -> Option<Chart> {
         y: Coded::new(v.into_iter(), LEVELS),
     };
     (!velocity.is_empty() && model.iter().any(|f| *f != 0.0)).then(|| Chart {
-        x_label: format!("velocity / ({}/s)", position_unit(kind)),
+        x_label,
         link: None,
+        x_log: false,
         pad: 0.03,
         x: vec![Coded::new(velocity.into_iter(), LEVELS)],
         panels: vec![Panel {
@@ -234,7 +277,7 @@ pub(super) fn friction_chart(data: &ReportData, joint: usize) -> Option<Chart> {
                 dots("from the data", "a", seen),
                 dots("of the model", "b", model),
             ],
-            bands: Vec::new(),
+            spans: Vec::new(),
             marks: Vec::new(),
         }],
     })
@@ -254,6 +297,7 @@ pub(super) fn spectrum_chart(spectrum: &Spectrum) -> Option<Chart> {
     (n > 0 && spectrum.equilibrated.len() == n).then(|| Chart {
         x_label: "number of the singular value".into(),
         link: None,
+        x_log: false,
         pad: 0.02,
         x: vec![Coded::new((1..=n).map(|k| k as f64), (n.max(2) - 1) as f64)],
         panels: vec![Panel {
@@ -264,7 +308,7 @@ pub(super) fn spectrum_chart(spectrum: &Spectrum) -> Option<Chart> {
                 line("of W in SI units", "b", &spectrum.raw),
                 line("with unit columns", "c", &spectrum.equilibrated),
             ],
-            bands: Vec::new(),
+            spans: Vec::new(),
             marks: Vec::new(),
         }],
     })
@@ -275,8 +319,12 @@ pub(super) fn cutoff_chart(curve: &CutoffCurve) -> Chart {
     Chart {
         x_label: "cutoff of the low-pass / Hz".into(),
         link: None,
+        x_log: true,
         pad: 0.03,
-        x: vec![Coded::new(curve.cutoff.iter().copied(), TIME_LEVELS)],
+        x: vec![Coded::new(
+            curve.cutoff.iter().map(|c| c.log10()),
+            TIME_LEVELS,
+        )],
         panels: vec![Panel {
             y_label: "held-out error / %".into(),
             log: false,
@@ -288,9 +336,9 @@ pub(super) fn cutoff_chart(curve: &CutoffCurve) -> Chart {
                 x: 0,
                 y: Coded::new(curve.error.iter().map(|e| 100.0 * e), LEVELS),
             }],
-            bands: Vec::new(),
+            spans: Vec::new(),
             marks: vec![Mark {
-                x: curve.chosen,
+                x: curve.chosen.log10(),
                 label: "taken".into(),
             }],
         }],

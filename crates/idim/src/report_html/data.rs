@@ -22,8 +22,6 @@ pub struct ReportData<'a> {
     pub cutoff: Option<&'a CutoffCurve>,
     /// What the log doctor found; `None` where it was not asked.
     pub findings: Option<&'a [ReportedFinding]>,
-    /// Tables of whatever was tried: friction models, baselines.
-    pub tables: &'a [ReportTable],
     /// Pictures as SVG text with their titles.
     pub figures: &'a [(String, String)],
     /// The published work that the run repeats, if it repeats one.
@@ -109,6 +107,8 @@ pub struct CutoffCurve {
 pub struct ReportedFinding {
     /// Its code.
     pub code: String,
+    /// How bad it is: `note`, `warning`, `error`; and whether it was waived.
+    pub severity: &'static str,
     /// Whether it would spoil a result.
     pub grave: bool,
     /// File, joint, time.
@@ -117,19 +117,6 @@ pub struct ReportedFinding {
     pub met: String,
     /// The rule and what to do.
     pub rule: String,
-}
-
-/// A table with a title.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ReportTable {
-    /// Title.
-    pub title: String,
-    /// What it shows, a sentence.
-    pub about: String,
-    /// Names of the columns.
-    pub header: Vec<String>,
-    /// One row after another; numbers as text.
-    pub rows: Vec<Vec<String>>,
 }
 
 /// Quantity and unit of what a joint is driven by.

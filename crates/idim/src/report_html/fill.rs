@@ -7,6 +7,7 @@ use crate::identify::{Identification, Prediction, TRAINING_SHARE};
 use crate::log_spec::LogSpec;
 use crate::result::IdentificationResult;
 use idim_measurement::Measurements;
+use idim_measurement::doctor::Severity;
 use idim_model::Robot;
 use std::path::Path;
 
@@ -17,7 +18,7 @@ pub(crate) fn summaries(training: &[Measurements], validation: &[Measurements]) 
     train.chain(held_out).collect()
 }
 
-/// The command as a person would type it: words that a shell would take apart are quoted.
+/// The command as a person would type it, an option a line: words that a shell would take apart are quoted.
 pub(crate) fn shell_line(words: impl IntoIterator<Item = String>) -> String {
     let quoted = |word: String| {
         let plain = |c: char| c.is_alphanumeric() || "-_=./,:+@".contains(c);
@@ -27,7 +28,16 @@ pub(crate) fn shell_line(words: impl IntoIterator<Item = String>) -> String {
             format!("'{}'", word.replace('\'', r"'\''"))
         }
     };
-    words.into_iter().map(quoted).collect::<Vec<_>>().join(" ")
+    let mut line = String::new();
+    for (k, word) in words.into_iter().enumerate() {
+        line += match (k, word.starts_with("--")) {
+            (0, _) => "",
+            (_, true) => " \\\n    ",
+            (_, false) => " ",
+        };
+        line += &quoted(word);
+    }
+    line
 }
 
 /// Files that went in, by name.
@@ -66,10 +76,20 @@ fn reported(checked: &CheckedFinding) -> ReportedFinding {
     let f = &checked.finding;
     ReportedFinding {
         code: f.code.into(),
+        severity: match (f.severity, checked.waived) {
+            (_, true) => "error, waived",
+            (Severity::Error, false) => "error",
+            (Severity::Warning, false) => "warning",
+            (Severity::Note, false) => "note",
+        },
         grave: checked.waived,
         place: f.place.to_string(),
         met: f.met.clone(),
-        rule: format!("{}; {}", f.rule, f.next_step),
+        rule: [f.rule.as_str(), &f.next_step]
+            .into_iter()
+            .filter(|part| !part.is_empty())
+            .collect::<Vec<_>>()
+            .join("; "),
     }
 }
 
@@ -89,7 +109,6 @@ pub(crate) fn page_of_logs(
         spectrum: Some(&found.spectrum),
         cutoff: None,
         findings: Some(&findings),
-        tables: &[],
         figures: &[],
         paper: None,
         command,
@@ -114,7 +133,6 @@ pub(crate) fn page_of_paper(
         spectrum: None,
         cutoff: None,
         findings: None,
-        tables: &[],
         figures,
         paper: Some(paper),
         command,

@@ -2,8 +2,8 @@
 
 use super::blocks::{Block, Cell, bar, figures, word};
 use super::data::ReportData;
-use crate::meaning::parameter_unit;
-use crate::result::ParameterResult;
+use crate::meaning::{legend, parameter_unit};
+use crate::result::{DownWeightedResult, DroppedResult, ParameterResult};
 use crate::table::{number, optional};
 
 pub(super) fn parameters(data: &ReportData) -> Vec<Block> {
@@ -28,10 +28,60 @@ pub(super) fn parameters(data: &ReportData) -> Vec<Block> {
         .iter()
         .map(|p| row(p, data, bars))
         .collect();
-    vec![
+    let names = estimate.parameters.iter().map(|p| p.name.as_str());
+    let mut blocks = vec![
         Block::Text(about),
         Block::table("Base parameters, SI", header, rows),
-    ]
+        Block::Soft(format!("{}.", legend(names, data.robot).join("; "))),
+    ];
+    blocks.extend(dropped(&estimate.dropped, data));
+    blocks.extend(down_weighted(&estimate.down_weighted, data));
+    blocks
+}
+
+/// What an essential fit left out.
+fn dropped(dropped: &[DroppedResult], data: &ReportData) -> Option<Block> {
+    let header = vec![
+        word("parameter"),
+        figures("value in the full fit"),
+        figures("95 % interval"),
+        word("unit"),
+    ];
+    let rows = dropped.iter().map(|d| {
+        vec![
+            word(&d.name),
+            figures(number(d.value)),
+            figures(format!("{} to {}", number(d.low), number(d.high))),
+            word(parameter_unit(&d.name, data.robot)),
+        ]
+    });
+    let caption = "Left out because the residual does not miss them: small beside their uncertainty, not zero";
+    (!dropped.is_empty()).then(|| Block::table(caption, header, rows.collect()))
+}
+
+/// Spans of time that a robust fit took the say from.
+fn down_weighted(spans: &[DownWeightedResult], data: &ReportData) -> Option<Block> {
+    let header = vec![
+        word("log"),
+        figures("from / s"),
+        figures("to / s"),
+        word("joints"),
+        figures("lowest weight"),
+    ];
+    let rows = spans.iter().map(|s| {
+        let joints = data.robot.joints();
+        let name = |j: &usize| joints.get(j - 1).map_or("", |j| j.name.as_str());
+        let names: Vec<&str> = s.joints.iter().map(name).collect();
+        vec![
+            word(&s.log),
+            figures(format!("{:.3}", s.from)),
+            figures(format!("{:.3}", s.to)),
+            word(names.join(", ")),
+            figures(format!("{:.2}", s.lowest_weight)),
+        ]
+    });
+    let caption = "Spans that lost their say, because their residuals are far from the others'";
+    (!spans.is_empty()).then(|| Block::table(caption, header, rows.collect()))
 }
 
 fn row(p: &ParameterResult, data: &ReportData, bars: bool) -> Vec<Cell> {
@@ -59,7 +109,14 @@ pub(super) fn identifiable(data: &ReportData) -> Vec<Block> {
             r.standard.len(), r.unidentifiable.len(), r.combined.len(), r.base.len(), r.identifiable_alone.len(), number(r.rank_gap),
         )),
         Block::Soft("An R before the number marks a combination: the estimate of ZZR1 is the sum on the right of its relation, not ZZ1 itself.".into()),
-        Block::Relations(r.base.iter().map(|b| b.relation.clone()).collect()),
+        // What nothing is regrouped into stands in the list of those for themselves.
+        Block::Relations(
+            r.base
+                .iter()
+                .filter(|b| b.relation != b.name)
+                .map(|b| b.relation.clone())
+                .collect(),
+        ),
     ];
     let lists = [
         ("No torque depends on", &r.unidentifiable),

@@ -27,12 +27,26 @@
     const step = [1, 2, 5, 10].find(m => m * size >= raw) * size;
     const out = [];
     for (let k = Math.ceil(low / step); k * step <= high * (1 + 1e-12) + 1e-300; k++) out.push(k * step);
+    if (out.length < 3 && wanted < 20) return ticks(low, high, 1.6 * wanted);
     return { at: out, digits: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
   }
 
   function label(v, digits) {
     if (v === 0) return "0";
     return Math.abs(v) >= 1e5 || digits > 5 ? v.toExponential(1) : v.toFixed(digits);
+  }
+
+  // Tenths, ones, tens and what lies between, on a logarithmic axis; two and five only where there is room.
+  function logTicks(low, high) {
+    const at = [], between = high - low < 3 ? [1, 2, 5] : [1], powers = low < -3 || high > 3;
+    for (let k = Math.floor(low); k <= high; k++) {
+      for (const m of between) {
+        const v = k + Math.log10(m);
+        if (v >= low - 1e-9 && v <= high + 1e-9) at.push({ at: v, text: powers ? (m === 1 ? "" : m + "·") + "10" + superscript(k) : String(Number((m * 10 ** k).toPrecision(1))) });
+      }
+    }
+    const every = Math.ceil(at.length / 9);
+    return at.filter((_, i) => i % every === 0);
   }
 
   const superscript = n => [...String(n)].map(c => c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]).join("");
@@ -97,21 +111,25 @@
     const px = x => LEFT + (x - range[0]) / (range[1] - range[0]) * PLOT;
     const py = y => bottom - (y - low) / (high - low) * panel.height;
     panel.top = top;
-    for (const [from, to] of panel.bands) {
-      const a = Math.max(px(from), LEFT), b = Math.min(px(to), LEFT + PLOT);
-      if (b > a) make(svg, "rect", { class: "band", x: a, y: top, width: b - a, height: panel.height });
-      if (b > a + 60 && top === TOP) make(svg, "text", { class: "note", x: a + 6, y: top + 15 }, "held out");
+    for (const span of panel.spans) {
+      const a = Math.max(px(span.from), LEFT), b = Math.min(px(span.to), LEFT + PLOT);
+      if (b <= a) continue;
+      if (span.shaded) make(svg, "rect", { class: "band", x: a, y: top, width: b - a, height: panel.height });
+      if (a > LEFT) make(svg, "path", { class: "edge", d: `M${a} ${top}v${panel.height}` });
+      if (b > a + 60 && top === TOP) make(svg, "text", { class: "note", x: a + 6, y: top + 15 }, span.label);
     }
-    const yt = ticks(low, high, panel.log ? 4 : panel.height / 45);
-    for (const v of yt.at) {
-      if (panel.log && v !== Math.round(v)) continue;
-      make(svg, "path", { class: "grid", d: `M${LEFT} ${py(v)}h${PLOT}` });
-      make(svg, "text", { class: "tick", x: LEFT - 6, y: py(v) + 4, "text-anchor": "end" }, panel.log ? "10" + superscript(Math.round(v)) : label(v, yt.digits));
+    const marked = (low, high, log, wanted) => {
+      if (log) return logTicks(low, high);
+      const t = ticks(low, high, wanted);
+      return t.at.map(v => ({ at: v, text: label(v, t.digits) }));
+    };
+    for (const t of marked(low, high, panel.log, panel.height / 45)) {
+      make(svg, "path", { class: "grid", d: `M${LEFT} ${py(t.at)}h${PLOT}` });
+      make(svg, "text", { class: "tick", x: LEFT - 6, y: py(t.at) + 4, "text-anchor": "end" }, t.text);
     }
-    const xt = ticks(range[0], range[1], 8);
-    for (const v of xt.at) {
-      make(svg, "path", { class: "grid", d: `M${px(v)} ${top}v${panel.height}` });
-      if (last) make(svg, "text", { class: "tick", x: px(v), y: bottom + 17, "text-anchor": "middle" }, label(v, xt.digits));
+    for (const t of marked(range[0], range[1], chart.spec.x_log, 8)) {
+      make(svg, "path", { class: "grid", d: `M${px(t.at)} ${top}v${panel.height}` });
+      if (last) make(svg, "text", { class: "tick", x: px(t.at), y: bottom + 17, "text-anchor": "middle" }, t.text);
     }
     make(svg, "text", { class: "axis", transform: `translate(16 ${top + panel.height / 2}) rotate(-90)`, "text-anchor": "middle" }, panel.y_label);
     const clip = make(svg, "clipPath", { id });
@@ -123,7 +141,8 @@
     }
     for (const m of panel.marks) {
       make(inside, "path", { class: "mark", d: `M${px(m.x)} ${top}v${panel.height}` });
-      make(inside, "text", { class: "note", x: px(m.x) + 5, y: top + 15 }, m.label);
+      const right = px(m.x) > LEFT + PLOT - 60;
+      make(inside, "text", { class: "note", x: px(m.x) + (right ? -5 : 5), y: top + 15, "text-anchor": right ? "end" : "start" }, m.label);
     }
     make(svg, "rect", { class: "frame", x: LEFT, y: top, width: PLOT, height: panel.height });
   }
@@ -178,7 +197,7 @@
         words.push(`${s.name} ${significant(panel.log ? 10 ** s.y[i] : s.y[i])}`);
       }
     }
-    chart.output.textContent = at === null ? "" : `${chart.spec.x_label}: ${significant(at)}; ${words.join(", ")}`;
+    chart.output.textContent = at === null ? "" : `${chart.spec.x_label}: ${significant(chart.spec.x_log ? 10 ** at : at)}; ${words.join(", ")}`;
   }
 
   function listen(chart) {

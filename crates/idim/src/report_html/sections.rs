@@ -1,10 +1,8 @@
 //! The chapters about torques, data, robot and the way to run it again.
 
 use super::blocks::{Block, Cell, figures as digits, word};
-use super::charts::{cutoff_chart, friction_chart, spectrum_chart, torque_chart};
+use super::charts::{cutoff_chart, spectrum_chart};
 use super::data::{LogSummary, ReportData, drive_words, position_unit};
-use super::verdict::{low_r2, quoted};
-use crate::result::JointError;
 use crate::table::{number, optional};
 use idim_model::{Joint, JointKind};
 
@@ -32,118 +30,6 @@ pub(super) fn paper(data: &ReportData) -> Vec<Block> {
         header,
         rows.collect(),
     )]
-}
-
-const TORQUES: &[(&str, &str)] = &[("a", "measured"), ("b", "predicted"), ("c", "residual")];
-
-pub(super) fn torque(data: &ReportData) -> Vec<Block> {
-    if data.predictions.is_empty() {
-        return Vec::new();
-    }
-    let (train, held_out) = (&data.result.train, &data.result.validation);
-    let mut blocks = Vec::new();
-    blocks.extend(held_out.as_ref().map(|e| {
-        errors_table(
-            "Held-out motion, not seen by the estimate",
-            &e.joints,
-            data,
-            false,
-        )
-    }));
-    blocks.extend(
-        train
-            .as_ref()
-            .map(|e| errors_table("Training motion", &e.joints, data, true)),
-    );
-    blocks.push(Block::Soft(
-        "Drag over a picture to zoom, double-click to see all; with the keyboard + − ← → and 0. All joints move together. Shaded spans were held out.".into(),
-    ));
-    for (j, joint) in data.robot.joints().iter().enumerate() {
-        let (quantity, unit) = drive_words(joint.kind);
-        let about = format!(
-            "Measured and predicted {quantity} ({unit}) over time, and the residual below. {}",
-            quoted(data, j, unit)
-        );
-        blocks.push(Block::figure(
-            format!("torque-{}", j + 1),
-            &joint.name,
-            about,
-            TORQUES,
-            &torque_chart(data, j),
-        ));
-    }
-    blocks
-}
-
-fn errors_table(caption: &str, joints: &[JointError], data: &ReportData, training: bool) -> Block {
-    // An energy model has one error for all joints.
-    let per_joint = joints.len() == data.robot.n_joints();
-    let mut header = vec![
-        word("joint"),
-        digits("rms of the residual"),
-        digits("relative error %"),
-        digits("R2"),
-    ];
-    if per_joint {
-        header.push(digits("largest residual"));
-    }
-    let row = |(j, e): (usize, &JointError)| {
-        let unit = if per_joint {
-            drive_words(data.robot.joints()[j].kind).1
-        } else {
-            "J"
-        };
-        let mut cells = vec![
-            word(&e.name),
-            digits(format!("{} {unit}", number(e.rms))),
-            digits(format!("{:.2}", 100.0 * e.relative_error)),
-            Cell {
-                low: low_r2(e.r2),
-                ..digits(format!("{:.4}", e.r2))
-            },
-        ];
-        if per_joint {
-            cells.push(digits(format!(
-                "{} {unit}",
-                number(largest_residual(data, j, training))
-            )));
-        }
-        cells
-    };
-    Block::table(
-        caption,
-        header,
-        joints.iter().enumerate().map(row).collect(),
-    )
-}
-
-fn largest_residual(data: &ReportData, joint: usize, training: bool) -> f64 {
-    let parts = data.predictions.iter().filter(|p| p.training == training);
-    parts
-        .flat_map(|p| p.measured[joint].iter().zip(&p.predicted[joint]))
-        .fold(0.0, |largest, (m, p)| f64::max(largest, (m - p).abs()))
-}
-
-pub(super) fn friction(data: &ReportData) -> Vec<Block> {
-    let mut blocks: Vec<Block> = Vec::new();
-    for (j, joint) in data.robot.joints().iter().enumerate() {
-        if let Some(chart) = friction_chart(data, j) {
-            let keys = &[("a", "from the data"), ("b", "of the model")];
-            blocks.push(Block::figure(
-                format!("friction-{}", j + 1),
-                &joint.name,
-                "Friction over the velocity of the joint.",
-                keys,
-                &chart,
-            ));
-        }
-    }
-    if !blocks.is_empty() {
-        blocks.insert(0, Block::Soft(
-            "Dots from the data: measured torque less everything the model predicts but friction. Dots of the model: its friction at the same samples.".into(),
-        ));
-    }
-    blocks
 }
 
 pub(super) fn condition(data: &ReportData) -> Vec<Block> {
@@ -280,12 +166,11 @@ pub(super) fn doctor(data: &ReportData) -> Vec<Block> {
     if findings.is_empty() {
         return vec![Block::Text("Nothing wrong was found.".into())];
     }
-    let header = ["code", "weight", "where", "met", "rule and next step"]
+    let header = ["code", "severity", "where", "met", "rule and next step"]
         .map(word)
         .into();
     let rows = findings.iter().map(|f| {
-        let weight = if f.grave { "grave, waived" } else { "remark" };
-        [f.code.as_str(), weight, &f.place, &f.met, &f.rule]
+        [f.code.as_str(), f.severity, &f.place, &f.met, &f.rule]
             .map(word)
             .into()
     });
@@ -294,28 +179,6 @@ pub(super) fn doctor(data: &ReportData) -> Vec<Block> {
         header,
         rows.collect(),
     )]
-}
-
-pub(super) fn tried(data: &ReportData) -> Vec<Block> {
-    let mut blocks = Vec::new();
-    // Whatever reads as a number stands to the right.
-    let cell = |text: &String| Cell {
-        number: text.trim_end_matches(" *").parse::<f64>().is_ok(),
-        ..word(text)
-    };
-    for t in data.tables {
-        blocks.push(Block::Heading(t.title.clone()));
-        let header = t.header.iter().enumerate().map(|(k, h)| Cell {
-            number: t
-                .rows
-                .first()
-                .is_some_and(|row| row.get(k).is_some_and(|c| cell(c).number)),
-            ..word(h)
-        });
-        let rows = t.rows.iter().map(|row| row.iter().map(cell).collect());
-        blocks.push(Block::table(&t.about, header.collect(), rows.collect()));
-    }
-    blocks
 }
 
 pub(super) fn figures(data: &ReportData) -> Vec<Block> {

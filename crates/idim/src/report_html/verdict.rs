@@ -68,6 +68,8 @@ pub(super) fn verdict(data: &ReportData) -> PlainVerdict {
     if let (Some(train), Some(v)) = (&r.train, &r.validation) {
         points.push(of_both(train, v, data.paper.is_some()));
     }
+    let both = r.validation.as_ref().zip(r.validation_in_band.as_ref());
+    points.extend(both.and_then(|(all, in_band)| of_band(all, in_band)));
     if let Some(estimate) = &r.estimate {
         points.extend(of_parameters(r, estimate));
         points.extend(of_condition(estimate, data.paper.is_some()));
@@ -165,15 +167,41 @@ fn of_both(train: &ErrorResult, held_out: &ErrorResult, simulated: bool) -> Stri
     text
 }
 
+/// A relative error smaller by this factor in the band of the fit says that most of the rest is not the model's.
+const IN_BAND: f64 = 0.8;
+
+/// What is left when noise above the motion and rows at rest are taken off, as the fit has the torques.
+fn of_band(all: &ErrorResult, in_band: &ErrorResult) -> Option<String> {
+    if in_band.relative_error > IN_BAND * all.relative_error {
+        return None;
+    }
+    let worst = in_band.joints.iter().min_by(|a, b| a.r2.total_cmp(&b.r2))?;
+    Some(format!(
+        "With the held-out torques filtered as for the fit, the least share of the variance explained is {:.1} % (at {}): the rest of the error above lies outside the band of the motion or in rows left out.",
+        100.0 * worst.r2,
+        worst.name
+    ))
+}
+
 fn of_parameters(r: &IdentificationResult, estimate: &EstimateResult) -> Vec<String> {
     let (found, base) = (estimate.parameters.len(), r.reduction.base.len());
-    let excited = if found < base {
+    let excited = if !estimate.dropped.is_empty() {
+        format!(
+            "{found} parameters are kept; {} are left out because the residual does not miss them.",
+            estimate.dropped.len()
+        )
+    } else if found < base {
         format!(
             "The log excites {found} of the {base} base parameters only; the motors could feel more on a richer motion."
         )
     } else {
+        let further = match found - base {
+            0 => String::new(),
+            1 => " One further friction term stands beside them.".into(),
+            n => format!(" {n} further friction terms stand beside them."),
+        };
         format!(
-            "The motors can feel {base} base parameters of {} standard ones, and the log excites them all.",
+            "The motors can feel {base} base parameters of {} standard ones, and the log excites them all.{further}",
             r.reduction.standard.len()
         )
     };
