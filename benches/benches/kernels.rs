@@ -80,10 +80,14 @@ fn least_squares(c: &mut Criterion) {
     let case = Case::ur5();
     let columns = case.with_friction();
     let states: JointStates = case.states(1_000_000);
+    let torques = jobs::torques(&case, &columns, &states);
     let mut group = c.benchmark_group("least squares");
     group.sample_size(10);
     group.bench_function("a million samples, 48 columns", |b| {
-        b.iter(|| black_box(jobs::least_squares(&case, &columns, &states)));
+        b.iter(|| black_box(jobs::least_squares(&case, &columns, &states, &torques)));
+    });
+    group.bench_function("the same by running QR", |b| {
+        b.iter(|| black_box(jobs::least_squares_qr(&case, &columns, &states, &torques)));
     });
 }
 

@@ -1,10 +1,11 @@
 //! The jobs that are timed beside the anchors and counted by the gate: one function each.
 
 use crate::Case;
-use idim_estimation::InformationFactor;
+use idim::{information_factor, running_qr};
+use idim_estimation::{InformationFactor, solve};
 use idim_excitation::{
-    Criterion, FourierDesign, FourierOptions, Scaling, condition_number, information_matrix,
-    log_condition_gradient, optimise_fourier,
+    ConditionRoute, Criterion, FourierDesign, FourierOptions, Scaling, condition_number,
+    information_matrix, information_with_observations, log_condition_gradient, optimise_fourier,
 };
 use idim_model::{Columns, JointStates, visit_torque_regressor};
 use idim_trajectory::Limits;
@@ -28,6 +29,18 @@ pub fn information(case: &Case, states: &JointStates) {
     ));
 }
 
+/// Products of columns and torques for the normal equations.
+pub fn information_observed(case: &Case, columns: &Columns, states: &JointStates, torques: &[f64]) {
+    let weights = vec![1.0; case.model.n_joints()];
+    black_box(information_with_observations(
+        &case.model,
+        columns,
+        states,
+        torques,
+        &weights,
+    ));
+}
+
 /// Condition number of the base columns, from states to number.
 pub fn condition(case: &Case, states: &JointStates) -> f64 {
     let weights = vec![1.0; case.model.n_joints()];
@@ -45,26 +58,64 @@ pub fn gradient(case: &Case, states: &JointStates) {
     ));
 }
 
-/// Running QR of `[W | y]` over base columns with friction; the observations are the positions, for want of torques.
+/// Torques of base columns with friction for least squares: those of parameters 1 for every column, and an error that
+/// depends on the sample alone.
+///
+/// # Panics
+/// Never: the shapes are the case's own.
+pub fn torques(case: &Case, columns: &Columns, states: &JointStates) -> Vec<f64> {
+    let (n, n_samples) = (case.model.n_joints(), states.n_samples());
+    let mut y = vec![0.0; n * n_samples];
+    visit_torque_regressor(&case.model, columns, states, |block| {
+        for joint in 0..n {
+            for lane in 0..block.n_samples() {
+                let at = joint * n_samples + block.first_sample() + lane;
+                y[at] = (0..columns.len())
+                    .map(|c| block.lanes(joint, c)[lane])
+                    .sum::<f64>()
+                    + 0.1 * (at as f64).sin();
+            }
+        }
+    });
+    y
+}
+
+/// Least squares over base columns with friction, from states and torques to the estimate: by products of the rows.
+///
+/// # Panics
+/// If the products do not serve: the states are made so that they do.
+pub fn least_squares(
+    case: &Case,
+    columns: &Columns,
+    states: &JointStates,
+    torques: &[f64],
+) -> Vec<f64> {
+    let weights = vec![1.0; case.model.n_joints()];
+    let (factor, route) =
+        information_factor(&case.model, columns, states, torques, &weights).expect("finite rows");
+    assert_eq!(route, ConditionRoute::Gram);
+    values(&factor)
+}
+
+/// The same by the running QR of the rows.
 ///
 /// # Panics
 /// Never: all numbers are finite.
-pub fn least_squares(case: &Case, columns: &Columns, states: &JointStates) -> InformationFactor {
-    let (n, p) = (case.model.n_joints(), columns.len());
-    let mut factor = InformationFactor::new(p);
-    let mut rows = vec![0.0; 8 * n * p];
-    let mut y = vec![0.0; 8 * n];
-    visit_torque_regressor(&case.model, columns, states, |block| {
-        let count = block.n_samples() * n;
-        for (k, row) in rows.chunks_exact_mut(p).take(count).enumerate() {
-            block.copy_row(k % n, k / n, row);
-            y[k] = states.q(k % n)[block.first_sample() + k / n];
-        }
-        factor
-            .push_rows(&rows[..count * p], &y[..count])
-            .expect("finite rows");
-    });
-    factor
+pub fn least_squares_qr(
+    case: &Case,
+    columns: &Columns,
+    states: &JointStates,
+    torques: &[f64],
+) -> Vec<f64> {
+    let weights = vec![1.0; case.model.n_joints()];
+    let factor = running_qr(&case.model, columns, states, torques, &weights).expect("finite rows");
+    values(&factor)
+}
+
+fn values(factor: &InformationFactor) -> Vec<f64> {
+    let solution = solve(factor).expect("enough rows");
+    let estimate = solution.determined().expect("random states excite all");
+    estimate.values
 }
 
 /// One start of the problem of `bench_exciting.py`: 66 variables, 100 samples.

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 /// Samples of a batch: full blocks, and a last one of four.
 const SAMPLES: usize = 100;
 
-const NAMES: [&str; 8] = [
+const NAMES: [&str; 9] = [
     "regressor_base",
     "regressor_standard",
     "regressor_one_sample",
@@ -17,6 +17,7 @@ const NAMES: [&str; 8] = [
     "condition_number",
     "condition_gradient",
     "reduction",
+    "information_observed",
     "running_qr",
 ];
 
@@ -43,12 +44,13 @@ fn run(name: &str, count: usize) {
     let case = Case::ur5();
     let friction = case.with_friction();
     let states = case.states(SAMPLES);
+    let torques = jobs::torques(&case, &friction, &states);
     for _ in 0..count {
-        once(name, &case, &friction, &states);
+        once(name, &case, &friction, (&states, &torques));
     }
 }
 
-fn once(name: &str, case: &Case, friction: &Columns, states: &JointStates) {
+fn once(name: &str, case: &Case, friction: &Columns, (states, torques): (&JointStates, &[f64])) {
     match name {
         "regressor_base" => jobs::regressor_batch(case, &case.base, states),
         "regressor_standard" => jobs::regressor_batch(case, &case.standard, states),
@@ -70,8 +72,9 @@ fn once(name: &str, case: &Case, friction: &Columns, states: &JointStates) {
             let order: Vec<usize> = (0..case.standard.len()).collect();
             black_box(reduction(&case.robot, &case.model, &case.standard, &order));
         }
+        "information_observed" => jobs::information_observed(case, friction, states, torques),
         _ => {
-            black_box(jobs::least_squares(case, friction, states));
+            black_box(jobs::least_squares_qr(case, friction, states, torques));
         }
     }
 }

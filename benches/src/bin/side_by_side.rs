@@ -33,15 +33,33 @@ fn main() {
         cpu_seconds() - start,
         design.values[0]
     );
+    least_squares(&case);
+}
+
+/// Twin: bench_ls.py, chunked normal equations. The torques are not part of the timing, there or here.
+fn least_squares(case: &Case) {
     let columns = case.with_friction();
     let states = case.states(LEAST_SQUARES_SAMPLES);
+    let torques = jobs::torques(case, &columns, &states);
+    let what = format!("{LEAST_SQUARES_SAMPLES} samples, {} columns", columns.len());
+    let time = cpu_time(3, || {
+        black_box(jobs::least_squares(case, &columns, &states, &torques));
+    });
+    line(&format!("least squares, {what}"), time, 1, "s", 1.0);
     let start = cpu_seconds();
-    black_box(jobs::least_squares(&case, &columns, &states));
+    black_box(jobs::least_squares_qr(case, &columns, &states, &torques));
     println!(
-        "  least squares by running QR, {LEAST_SQUARES_SAMPLES} samples, {} columns: {:.3} s",
-        columns.len(),
-        cpu_seconds() - start
+        "  the same by running QR: {:.3} s; peak memory {}",
+        cpu_seconds() - start,
+        peak_memory()
     );
+}
+
+/// Largest resident memory of this process so far, as the system counts it.
+fn peak_memory() -> String {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    line.map_or("not known".into(), |kb| kb.trim().to_owned())
 }
 
 fn line(what: &str, (least, median): (f64, f64), per: usize, unit: &str, scale: f64) {

@@ -37,6 +37,22 @@ impl InformationFactor {
         }
     }
 
+    /// From the entries `(row, column)` of `[R z; 0 e]`, asked for where `row <= column`.
+    pub(crate) fn of_triangle(
+        n_columns: usize,
+        n_rows: usize,
+        entry: impl Fn(usize, usize) -> f64,
+    ) -> Self {
+        let mut factor = Self::new(n_columns);
+        factor.n_rows = n_rows;
+        for j in 0..=n_columns {
+            for i in 0..=j {
+                factor.triangle[j * factor.width + i] = entry(i, j);
+            }
+        }
+        factor
+    }
+
     /// Folds rows in: `w` holds rows of `W` one after another (row-major), `y` one observation a row.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 //! One equation: the running QR `[W | y] -> [R z; 0 e]`, with `‖y - W x‖² = ‖z - R x‖² + e²` for every `x` (Bierman 1977). `W` is
 //! never stored; a log of any length becomes a triangle of a few kilobytes, and triangles merge.
 //!
-//! - [`InformationFactor`] folds rows in; [`solve`] and [`solve_with_known_noise`] read the answer.
+//! - [`InformationFactor`] folds rows in, or takes their products where those are accurate enough; [`solve`] and [`solve_with_known_noise`] read the answer.
 //! - [`weighted_least_squares`] weights the joints by the covariance of their residuals; [`NoiseCovariance`] whitens rows by hand.
 //! - [`partial_least_squares`] does both of a dense `W` some of whose rows are left out, with uncertainty for noise that remembers.
 //! - [`robust_least_squares`] loses outliers, [`essential_parameters`] what the data do not need, [`total_least_squares`] finds drive gains.
@@ -40,6 +40,7 @@ mod householder;
 mod information;
 mod noise;
 mod partial;
+mod products;
 mod quantile;
 mod rank;
 mod residuals;
@@ -72,6 +73,7 @@ pub use noise::{NoiseCovariance, ResidualCovariance};
 pub use partial::{
     PartialEstimate, PartialOptions, PartialRows, partial_least_squares, whitened_factor,
 };
+pub use products::PRODUCTS_LIMIT;
 pub use quantile::{chi_square_quantile, f_quantile, student_t_quantile};
 pub use rank::{RANK_TOLERANCE, VANISHING_COLUMN};
 pub use residuals::{JointResidual, ResidualStatistics};

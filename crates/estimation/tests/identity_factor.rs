@@ -195,3 +195,53 @@ fn overflowing_rows_are_refused() {
 fn wrong_shape_is_a_callers_bug() {
     let _ = InformationFactor::new(2).push_rows(&[1.0, 2.0, 3.0], &[1.0, 2.0]);
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(64) })]
+
+    /// The normal equations lose half the digits at most: `n u cond²` of a condition of at most 100 here, or they decline.
+    #[test]
+    fn identity_products_give_the_factor_of_the_rows(m in 60_usize..300, n in 1_usize..16, seed: u64) {
+        let mut rng = rng(seed);
+        let (w, y) = (random_rows(&mut rng, m, n), normals(&mut rng, m));
+        let rows = factor(&w, &y, n);
+        let mut whole = common::dense(&w, n);
+        whole.resize_with(m, n + 1, |i, _| y[i]);
+        let products = whole.transpose() * &whole;
+        let by_products = InformationFactor::from_products(products.as_ref(), m).unwrap();
+        prop_assert_eq!(by_products.n_rows(), m);
+        let (a, b) = (estimate(&by_products), estimate(&rows));
+        prop_assert!(distance(&a.values, &b.values) <= 1e-11);
+        prop_assert!((a.residual_norm / b.residual_norm - 1.0).abs() <= 1e-11);
+    }
+}
+
+#[test]
+fn identity_products_decline_what_they_cannot_carry() {
+    let mut rng = rng(5);
+    let (m, n) = (200, 4);
+    let w = random_rows(&mut rng, m, n);
+    let products = |w: &[f64], y: &[f64]| {
+        let mut whole = common::dense(w, n);
+        whole.resize_with(m, n + 1, |i, _| y[i]);
+        whole.transpose() * &whole
+    };
+    let noise = normals(&mut rng, m);
+    assert!(InformationFactor::from_products(products(&w, &noise).as_ref(), m).is_some());
+    // Columns that differ by one part in 1e5.
+    let mut near = w.clone();
+    for row in near.chunks_exact_mut(n) {
+        row[1] = row[0] + 1e-5 * row[1];
+    }
+    assert!(InformationFactor::from_products(products(&near, &noise).as_ref(), m).is_none());
+    // Observations that the columns explain to rounding.
+    let exact: Vec<f64> = w.chunks_exact(n).map(|row| row.iter().sum()).collect();
+    assert!(InformationFactor::from_products(products(&w, &exact).as_ref(), m).is_none());
+    // A column that never moves, and a number that is none.
+    let mut still = w.clone();
+    still.chunks_exact_mut(n).for_each(|row| row[2] = 0.0);
+    assert!(InformationFactor::from_products(products(&still, &noise).as_ref(), m).is_none());
+    let mut none = w;
+    none[7] = f64::NAN;
+    assert!(InformationFactor::from_products(products(&none, &noise).as_ref(), m).is_none());
+}

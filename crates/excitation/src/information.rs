@@ -24,69 +24,79 @@ pub fn information_matrix(
     states: &JointStates,
     joint_weights: &[f64],
 ) -> Mat<f64> {
-    information_on(pulp::Arch::new(), model, columns, states, joint_weights)
+    let arch = pulp::Arch::new();
+    products_on(arch, model, columns, (states, None), joint_weights)
 }
 
-/// The same, folded with these instructions.
+/// `Σ_t [Y_t | y_t]ᵀ D [Y_t | y_t]` of all samples, `(p + 1) × (p + 1)`: all that the normal equations need.
+///
+/// `observed`: one number a joint and sample, joint by joint as the states; otherwise as [`information_matrix`]. Memory does
+/// not grow with the samples.
+///
+/// # Panics
+/// If a shape does not fit the model.
 #[track_caller]
-fn information_on(
-    arch: pulp::Arch,
+pub fn information_with_observations(
     model: &Model,
     columns: &Columns,
     states: &JointStates,
+    observed: &[f64],
     joint_weights: &[f64],
 ) -> Mat<f64> {
-    let (n, p) = (model.n_joints(), columns.len());
+    let arch = pulp::Arch::new();
+    products_on(
+        arch,
+        model,
+        columns,
+        (states, Some(observed)),
+        joint_weights,
+    )
+}
+
+/// Products of all columns and, where there is one, the observation, folded with these instructions.
+#[track_caller]
+fn products_on(
+    arch: pulp::Arch,
+    model: &Model,
+    columns: &Columns,
+    (states, observed): (&JointStates, Option<&[f64]>),
+    joint_weights: &[f64],
+) -> Mat<f64> {
+    let n = model.n_joints();
     assert_eq!(
         states.n_joints(),
         n,
         "the states have another number of joints than the model"
     );
     assert_eq!(joint_weights.len(), n, "one weight a joint");
-    let reached = reached_tiles(model, columns);
     let blocks = TOGETHER.min(states.n_samples().div_ceil(LANES));
     let mut tiles = RegressorTiles::new(model, columns, blocks);
-    let mut sum = vec![0.0; p * p];
+    let mut sum = vec![0.0; tiles.n_keys().pow(2)];
     let mut first = 0;
     while first < states.n_samples() {
-        first += tiles.fill(model, states, first);
+        first += tiles.fill(model, states, observed, first);
         arch.dispatch(Fold {
             tiles: &tiles,
-            reached: &reached,
+            observed: observed.is_some(),
             joint_weights,
-            p,
             sum: &mut sum,
         });
     }
-    Mat::from_fn(p, p, |a, b| sum[a.min(b) * p + a.max(b)])
-}
-
-/// For each joint, the tiles with a column its torque depends on, in increasing order.
-fn reached_tiles(model: &Model, columns: &Columns) -> Vec<Vec<usize>> {
-    let mut reached = vec![Vec::new(); model.n_joints()];
-    for (column, p) in columns.0.iter().enumerate() {
-        let own = [p.index];
-        let joints = match p.kind.inertial_index() {
-            Some(_) => model.path(p.index),
-            None => &own,
-        };
-        for &joint in joints {
-            reached[joint].push(column / TILE);
-        }
-    }
-    for tiles in &mut reached {
-        tiles.dedup();
-    }
-    reached
+    // The observation has the last key and is the last column.
+    let mut columns = tiles.columns().to_vec();
+    columns.extend(observed.map(|_| (tiles.n_keys() - 1, 1.0)));
+    Mat::from_fn(columns.len(), columns.len(), |a, b| {
+        let ((a, sign), (b, other)) = (columns[a], columns[b]);
+        sign * other * sum[a.min(b) * tiles.n_keys() + a.max(b)]
+    })
 }
 
 /// The products of all rows of the samples at hand.
 struct Fold<'a> {
     tiles: &'a RegressorTiles,
-    reached: &'a [Vec<usize>],
+    observed: bool,
     joint_weights: &'a [f64],
-    p: usize,
-    /// Upper triangle, row by row.
+    /// At `a * n_keys + b`, keys `a <= b`.
     sum: &'a mut [f64],
 }
 
@@ -95,49 +105,78 @@ impl pulp::WithSimd for Fold<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(mut self, simd: S) {
-        for (joint, reached) in self.reached.iter().enumerate() {
-            for (k, &a) in reached.iter().enumerate() {
-                for &b in &reached[k..] {
+        for (joint, &weight) in self.joint_weights.iter().enumerate() {
+            let (row, width) = (self.tiles.row(joint), self.tiles.width(joint));
+            // The observation is the last entry of a row: without it the last tile may be empty.
+            let entries = self.tiles.keys(joint).len() - usize::from(!self.observed);
+            for a in 0..entries.div_ceil(TILE) {
+                for b in a..entries.div_ceil(TILE) {
                     let mut lanes = [[[0.0; LANES]; TILE]; TILE];
-                    let (left, right) = (self.tiles.panel(joint, a), self.tiles.panel(joint, b));
                     for part in 0..LANES / S::F64_LANES {
-                        // Sixteen sums, and what enters them, fit 32 registers, not 16.
+                        // Sixteen sums, and what enters them, fit 32 registers, not 16. Of a tile with itself only half is
+                        // needed.
                         if S::REGISTER_COUNT >= 32 {
-                            products::<S, TILE>(simd, (left, right), (part, 0), &mut lanes);
+                            products::<S, TILE, TILE>(
+                                simd,
+                                row,
+                                (width, a, b),
+                                (part, 0),
+                                &mut lanes,
+                            );
                         } else {
-                            products::<S, 2>(simd, (left, right), (part, 0), &mut lanes);
-                            products::<S, 2>(simd, (left, right), (part, 2), &mut lanes);
+                            if a == b {
+                                products::<S, 2, 2>(
+                                    simd,
+                                    row,
+                                    (width, a, b),
+                                    (part, 0),
+                                    &mut lanes,
+                                );
+                            } else {
+                                products::<S, TILE, 2>(
+                                    simd,
+                                    row,
+                                    (width, a, b),
+                                    (part, 0),
+                                    &mut lanes,
+                                );
+                            }
+                            products::<S, TILE, 2>(simd, row, (width, a, b), (part, 2), &mut lanes);
                         }
                     }
-                    self.add(self.joint_weights[joint], (a, b), &lanes);
+                    self.add((joint, weight), (a, b), &lanes);
                 }
             }
         }
     }
 }
 
-/// Products of the four columns of a tile with `B` of another one's, from column `from` on, summed over the blocks.
+/// Products of the first `A` entries of a tile with `B` of another one's, from entry `from` on, summed over the blocks.
 #[inline(always)]
-fn products<S: pulp::Simd, const B: usize>(
+fn products<S: pulp::Simd, const A: usize, const B: usize>(
     simd: S,
-    (left, right): (&[[F64x8; TILE]], &[[F64x8; TILE]]),
+    row: &[[F64x8; TILE]],
+    (width, left, right): (usize, usize, usize),
     (part, from): (usize, usize),
     lanes: &mut [[[f64; LANES]; TILE]; TILE],
 ) {
-    let mut sums = [[simd.splat_f64s(0.0); B]; TILE];
-    for (a, b) in left.iter().zip(right) {
+    // Told once, it need not be checked for every block.
+    assert!(left < width && right < width, "no such tile");
+    let mut sums = [[simd.splat_f64s(0.0); B]; A];
+    for tiles in row.chunks_exact(width) {
+        let (a, b) = (&tiles[left], &tiles[right]);
         let mut y = [simd.splat_f64s(0.0); B];
         for t in 0..B {
             y[t] = S::as_simd_f64s(&b[from + t].0).0[part];
         }
-        for s in 0..TILE {
+        for s in 0..A {
             let x = S::as_simd_f64s(&a[s].0).0[part];
             for t in 0..B {
                 sums[s][t] = simd.mul_add_f64s(x, y[t], sums[s][t]);
             }
         }
     }
-    for s in 0..TILE {
+    for s in 0..A {
         for t in 0..B {
             S::as_mut_simd_f64s(&mut lanes[s][from + t]).0[part] = sums[s][t];
         }
@@ -147,18 +186,20 @@ fn products<S: pulp::Simd, const B: usize>(
 impl Fold<'_> {
     /// Adds the lanes of a tile's products in one order, whatever the registers.
     #[inline(always)]
-    fn add(&mut self, weight: f64, (a, b): (usize, usize), lanes: &[[[f64; LANES]; TILE]; TILE]) {
-        let width = self.p.saturating_sub(b * TILE).min(TILE);
-        for (s, lanes) in lanes.iter().enumerate() {
-            let row = a * TILE + s;
-            if row >= self.p {
-                break;
-            }
-            let sums = &mut self.sum[row * self.p + b * TILE..][..width];
-            for (sum, lanes) in sums.iter_mut().zip(lanes) {
+    fn add(
+        &mut self,
+        (joint, weight): (usize, f64),
+        (a, b): (usize, usize),
+        lanes: &[[[f64; LANES]; TILE]; TILE],
+    ) {
+        let (keys, n) = (self.tiles.keys(joint), self.tiles.n_keys());
+        let of_tile = |tile: usize| &keys[tile * TILE..keys.len().min((tile + 1) * TILE)];
+        for (&key, lanes) in of_tile(a).iter().zip(lanes) {
+            let sums = &mut self.sum[key * n..][..n];
+            for (&other, lanes) in of_tile(b).iter().zip(lanes) {
                 let [a0, a1, a2, a3, a4, a5, a6, a7] = *lanes;
                 let total = ((a0 + a4) + (a2 + a6)) + ((a1 + a5) + (a3 + a7));
-                *sum = weight.mul_add(total, *sum);
+                sums[other] = weight.mul_add(total, sums[other]);
             }
         }
     }
@@ -188,7 +229,7 @@ mod tests {
         let weights = [0.5, 2.0, 3.0];
         let expected = information_matrix(&model, &columns, &states, &weights);
         for arch in architectures() {
-            let found = information_on(arch, &model, &columns, &states, &weights);
+            let found = products_on(arch, &model, &columns, (&states, None), &weights);
             assert_eq!(found, expected, "{arch:?}");
         }
     }

@@ -78,7 +78,7 @@ pub use fourier::{
     optimise_fourier_watched, series_conditioning, weighted_conditioning,
 };
 pub use fourier_options::{FourierEnds, FourierOptions};
-pub use information::information_matrix;
+pub use information::{information_matrix, information_with_observations};
 pub use path_certificate::{ClearanceCertificate, TorqueCertificate};
 pub use points::{EnergyDesign, PointLimits};
 pub use points_powell::{PointDesign, PowellPointOptions, optimise_points_powell};

@@ -437,9 +437,10 @@ impl<C: Copy> RegressorContraction<'_, C> {
         let mut bar = LinkMotion::zero(at);
         let mut below = Screw::zero(at);
         for d in &joint.directions {
-            for &i in &joint.path[d.range.clone()] {
+            for k in d.range.clone() {
+                let i = joint.path[k];
                 let ten = self.weights_of(at, j, i);
-                let axis = self.kinematics.axis::<T>(at, j, d, i);
+                let axis = self.kinematics.axis::<T>(at, j, d, k);
                 let axis = match &joint.link {
                     LinkPose::Along(_) => axis,
                     LinkPose::Posed {

@@ -39,6 +39,7 @@ mod kinematics;
 mod lane;
 mod model;
 mod newton_euler;
+mod packing;
 mod parameter;
 mod plan;
 mod pose;

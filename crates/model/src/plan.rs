@@ -7,7 +7,7 @@ use crate::parameter::{Columns, ParameterKind};
 /// Which entry of which link goes to which column, found once.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
-    /// Distance of the rows: the number of columns, unless they are spread.
+    /// Number of columns.
     pub(crate) n_columns: usize,
     pub(crate) links: Vec<LinkPlan>,
     /// For each joint: (drive kind, column).
@@ -59,12 +59,17 @@ impl LinkPlan {
         wanted >> k & 1 == 1
     }
 
-    /// Writes entry `k`, which is asked for, to its column of a row.
+    /// How many entries are asked for.
     #[inline(always)]
-    pub(crate) fn put<T: Lane>(&self, at: T::At, k: usize, row: &mut [T::Cell], value: T) {
-        // Without a branch: there is one of these for every entry of the regressor.
-        let value = value.flipped(self.sign[k]);
-        value.write(at, &mut row[self.column[k]]);
+    pub(crate) fn n_wanted(&self) -> usize {
+        self.wanted.count_ones() as usize
+    }
+
+    /// Place of entry `k` among those asked for.
+    #[inline(always)]
+    pub(crate) fn rank<const WANTED: u16>(&self, k: usize) -> usize {
+        let wanted = if WANTED == ASK { self.wanted } else { WANTED };
+        (wanted & ((1 << k) - 1)).count_ones() as usize
     }
 
     /// Entry `k` from its column of a row, zero where it was not asked for.
@@ -74,6 +79,65 @@ impl LinkPlan {
             return T::splat(at, 0.0);
         }
         T::read(at, &row[self.column[k]]).flipped(self.sign[k])
+    }
+}
+
+/// Where the entries of the regressor are written to.
+pub(crate) trait Layout<C>: Copy {
+    /// First cell of a link's entries in the row of `joint`, the `k`-th on its path.
+    fn row(self, link: usize, k: usize, joint: usize) -> usize;
+
+    /// Cells from there on that the link's entries lie in.
+    fn length<const WANTED: u16>(self, link: &LinkPlan) -> usize;
+
+    /// Writes entry `k`, which is asked for, to its place among them.
+    fn put<T: Lane<Cell = C>, const WANTED: u16>(
+        self,
+        at: T::At,
+        link: &LinkPlan,
+        k: usize,
+        cells: &mut [C],
+        value: T,
+    );
+
+    /// The cell of a joint's drive entry, the `d`-th of its own.
+    fn drive(self, joint: usize, d: usize, column: usize) -> usize;
+}
+
+/// Rows of all columns, one after another, each column at its place and with its sign.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Full {
+    pub(crate) n_columns: usize,
+}
+
+impl<C> Layout<C> for Full {
+    #[inline(always)]
+    fn row(self, _: usize, _: usize, joint: usize) -> usize {
+        joint * self.n_columns
+    }
+
+    #[inline(always)]
+    fn length<const WANTED: u16>(self, _: &LinkPlan) -> usize {
+        self.n_columns
+    }
+
+    #[inline(always)]
+    fn put<T: Lane<Cell = C>, const WANTED: u16>(
+        self,
+        at: T::At,
+        link: &LinkPlan,
+        k: usize,
+        cells: &mut [C],
+        value: T,
+    ) {
+        // Without a branch: there is one of these for every entry of the regressor.
+        let value = value.flipped(link.sign[k]);
+        value.write(at, &mut cells[link.column[k]]);
+    }
+
+    #[inline(always)]
+    fn drive(self, joint: usize, _: usize, column: usize) -> usize {
+        joint * self.n_columns + column
     }
 }
 
@@ -113,20 +177,5 @@ impl Plan {
             link.column[entry] = column;
         }
         plan
-    }
-
-    /// The same entries where column `c` stands at `place(c)` of rows `distance` apart.
-    pub(crate) fn spread(mut self, distance: usize, place: impl Fn(usize) -> usize) -> Self {
-        self.n_columns = distance;
-        for link in &mut self.links {
-            link.column = link.column.map(&place);
-        }
-        for (_, column) in self.drives.iter_mut().flatten() {
-            *column = place(*column);
-        }
-        for twin in &mut self.twins {
-            (twin.column, twin.first) = (place(twin.column), place(twin.first));
-        }
-        self
     }
 }

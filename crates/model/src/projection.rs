@@ -9,9 +9,10 @@ use crate::kinematics::{LinkMotion, Screw, Travel, zero_motion};
 use crate::lane::{Lane, V3, minus, read, splat, times, write, zero};
 use crate::model::{Direction, KernelJoint, Model};
 use crate::parameter::ParameterKind;
-use crate::plan::{ALL, ASK, BASE_XX, BASE_YY, LinkPlan, Plan};
+use crate::plan::{ALL, ASK, BASE_XX, BASE_YY, Full, Layout, LinkPlan, Plan};
 use crate::robot::JointKind;
 use crate::wrench_map::{ABOUT_Z, ACROSS, ANY, WrenchMap};
+use std::ops::Range;
 
 /// Motions and axes of one sample or eight.
 #[derive(Debug, Clone)]
@@ -23,7 +24,8 @@ pub(crate) struct Kinematics<C> {
     motion: Vec<LinkMotion<C>>,
     /// At `link * n + d`: direction `d` of the link's path; the last one is z and stays.
     direction: Vec<V3<C>>,
-    /// At `link * n + joint`: speed of the link's origin per unit speed of a revolute joint; zero for the link's own.
+    /// At `link * n + k`: speed of the link's origin per unit speed of the `k`-th joint on its path, if it turns; zero for
+    /// the link's own.
     linear: Vec<V3<C>>,
 }
 
@@ -40,20 +42,20 @@ impl<C: Copy> Kinematics<C> {
         }
     }
 
-    /// Axis of joint `i`, of direction `d`, at the frame of link `j`.
+    /// Axis of the `k`-th joint on the path of link `j`, of direction `d`, at the frame of the link.
     #[inline(always)]
     pub(crate) fn axis<T: Lane<Cell = C>>(
         &self,
         at: T::At,
         j: usize,
         d: &Direction,
-        i: usize,
+        k: usize,
     ) -> Screw<T> {
         let direction = read(at, &self.direction[j * self.n + d.index]);
         match d.kind {
             JointKind::Revolute => Screw {
                 angular: direction,
-                linear: read(at, &self.linear[j * self.n + i]),
+                linear: read(at, &self.linear[j * self.n + k]),
             },
             JointKind::Prismatic => Screw {
                 angular: zero(at),
@@ -186,8 +188,8 @@ impl<C: Copy> Kinematics<C> {
             if d.kind == JointKind::Prismatic {
                 continue;
             }
-            for &i in &joint.path[d.range.clone()] {
-                let inside = read(at, &linears[i]);
+            for k in d.range.clone() {
+                let inside = read(at, &linears[k]);
                 let shifted = if own_of_below {
                     shift_about_z(p_from, inside)
                 } else {
@@ -198,7 +200,7 @@ impl<C: Copy> Kinematics<C> {
                     linear[0] = direction[1].mul_add(d, linear[0]);
                     linear[1] = (-direction[0]).mul_add(d, linear[1]);
                 }
-                write(at, linear, &mut out_linear[i]);
+                write(at, linear, &mut out_linear[k]);
             }
         }
     }
@@ -236,30 +238,19 @@ pub(crate) fn fill<T: Lane>(
     at: T::At,
     model: &Model,
     plan: &Plan,
-    [q, qd, qdd]: [&[T::Cell]; 3],
+    state: [&[T::Cell]; 3],
     kinematics: &mut Kinematics<T::Cell>,
     rows: &mut [T::Cell],
 ) {
     let p = plan.n_columns;
-    kinematics.turn_joints::<T>(at, model, q);
-    for (j, joint) in model.joints.iter().enumerate() {
-        let (qd, qdd) = (T::read(at, &qd[j]), T::read(at, &qdd[j]));
-        let map = kinematics.go_out(at, model, j, [qd, qdd]);
-        let link = &plan.links[j];
-        if !link.is_empty() {
-            let to = Target { at, j, link, p };
-            to.project(joint, &map, kinematics, rows);
-        }
-        for &(kind, column) in &plan.drives[j] {
-            let entry = match kind {
-                ParameterKind::Ia => qdd,
-                ParameterKind::Fv => qd,
-                ParameterKind::Fc => qd.sign(),
-                _ => T::splat(at, 1.0),
-            };
-            entry.write(at, &mut rows[j * p + column]);
-        }
-    }
+    fill_as::<T, _>(
+        at,
+        model,
+        (plan, Full { n_columns: p }),
+        state,
+        kinematics,
+        rows,
+    );
     for twin in &plan.twins {
         for &i in &model.joints[twin.link].path {
             let entry = T::read(at, &rows[i * p + twin.first]);
@@ -268,15 +259,51 @@ pub(crate) fn fill<T: Lane>(
     }
 }
 
-/// The columns of a link, in rows of `p`.
-struct Target<'a, T: Lane> {
+/// The same in a layout, without columns that are asked for more than once.
+#[inline(always)]
+pub(crate) fn fill_as<T: Lane, L: Layout<T::Cell>>(
+    at: T::At,
+    model: &Model,
+    (plan, layout): (&Plan, L),
+    [q, qd, qdd]: [&[T::Cell]; 3],
+    kinematics: &mut Kinematics<T::Cell>,
+    cells: &mut [T::Cell],
+) {
+    kinematics.turn_joints::<T>(at, model, q);
+    for (j, joint) in model.joints.iter().enumerate() {
+        let (qd, qdd) = (T::read(at, &qd[j]), T::read(at, &qdd[j]));
+        let map = kinematics.go_out(at, model, j, [qd, qdd]);
+        let link = &plan.links[j];
+        if !link.is_empty() {
+            let to = Target {
+                at,
+                j,
+                link,
+                layout,
+            };
+            to.project(joint, &map, kinematics, cells);
+        }
+        for (d, &(kind, column)) in plan.drives[j].iter().enumerate() {
+            let entry = match kind {
+                ParameterKind::Ia => qdd,
+                ParameterKind::Fv => qd,
+                ParameterKind::Fc => qd.sign(),
+                _ => T::splat(at, 1.0),
+            };
+            entry.write(at, &mut cells[layout.drive(j, d, column)]);
+        }
+    }
+}
+
+/// The cells of a link's entries.
+struct Target<'a, T: Lane, L> {
     at: T::At,
     j: usize,
     link: &'a LinkPlan,
-    p: usize,
+    layout: L,
 }
 
-impl<T: Lane> Target<'_, T> {
+impl<T: Lane, L: Layout<T::Cell>> Target<'_, T, L> {
     /// The rows' entries for the link's columns.
     #[inline(always)]
     fn project(
@@ -284,7 +311,7 @@ impl<T: Lane> Target<'_, T> {
         joint: &KernelJoint,
         map: &WrenchMap<T>,
         kinematics: &Kinematics<T::Cell>,
-        rows: &mut [T::Cell],
+        cells: &mut [T::Cell],
     ) {
         match (&joint.link, self.link.wanted) {
             (
@@ -294,11 +321,11 @@ impl<T: Lane> Target<'_, T> {
                     ..
                 },
                 _,
-            ) => self.project_posed(joint, map, (rotation, *translation), kinematics, rows),
-            (_, BASE_XX) => self.project_along::<BASE_XX>(joint, map, kinematics, rows),
-            (_, BASE_YY) => self.project_along::<BASE_YY>(joint, map, kinematics, rows),
-            (_, ALL) => self.project_along::<ALL>(joint, map, kinematics, rows),
-            _ => self.project_along::<ASK>(joint, map, kinematics, rows),
+            ) => self.project_posed(joint, map, (rotation, *translation), kinematics, cells),
+            (_, BASE_XX) => self.project_along::<BASE_XX>(joint, map, kinematics, cells),
+            (_, BASE_YY) => self.project_along::<BASE_YY>(joint, map, kinematics, cells),
+            (_, ALL) => self.project_along::<ALL>(joint, map, kinematics, cells),
+            _ => self.project_along::<ASK>(joint, map, kinematics, cells),
         }
     }
 
@@ -309,28 +336,34 @@ impl<T: Lane> Target<'_, T> {
         joint: &KernelJoint,
         map: &WrenchMap<T>,
         kinematics: &Kinematics<T::Cell>,
-        rows: &mut [T::Cell],
+        cells: &mut [T::Cell],
     ) {
         let (at, n) = (self.at, kinematics.n);
-        let linear = &kinematics.linear[self.j * n..][..n];
+        let linear = &kinematics.linear[self.j * n..][..joint.path.len()];
         let direction = &kinematics.direction[self.j * n..][..n];
         for d in &joint.directions {
             let v = read(at, &direction[d.index]);
-            let joints = &joint.path[d.range.clone()];
+            let Range { start, end } = d.range;
             let own = d.index + 1 == joint.directions.len();
             match (d.kind, own, d.across) {
                 (JointKind::Prismatic, _, _) => {
-                    let row = self.row(joints[0], rows);
+                    let row = self.row::<WANTED>(joint, start, cells);
                     for k in 6..10 {
                         if self.link.wants::<WANTED>(k) {
-                            self.link.put(at, k, row, map.force_entry(k, v));
+                            self.put::<WANTED>(k, row, map.force_entry(k, v));
                         }
                     }
                 }
                 (_, true, _) => {
-                    let below = &joints[..joints.len() - 1];
-                    self.project_direction::<ABOUT_Z, WANTED>(below, v, linear, map, rows);
-                    let row = self.row(self.j, rows);
+                    let below = start..end - 1;
+                    self.project_direction::<ABOUT_Z, WANTED>(
+                        joint,
+                        below,
+                        (v, linear),
+                        map,
+                        cells,
+                    );
+                    let row = self.row::<WANTED>(joint, end - 1, cells);
                     for k in 0..8 {
                         if self.link.wants::<WANTED>(k) {
                             let entry = if k < 6 {
@@ -338,14 +371,26 @@ impl<T: Lane> Target<'_, T> {
                             } else {
                                 map.own_moment_entry(k)
                             };
-                            self.link.put(at, k, row, entry);
+                            self.put::<WANTED>(k, row, entry);
                         }
                     }
                 }
                 (_, _, true) => {
-                    self.project_direction::<ACROSS, WANTED>(joints, v, linear, map, rows);
+                    self.project_direction::<ACROSS, WANTED>(
+                        joint,
+                        start..end,
+                        (v, linear),
+                        map,
+                        cells,
+                    );
                 }
-                _ => self.project_direction::<ANY, WANTED>(joints, v, linear, map, rows),
+                _ => self.project_direction::<ANY, WANTED>(
+                    joint,
+                    start..end,
+                    (v, linear),
+                    map,
+                    cells,
+                ),
             }
         }
     }
@@ -354,11 +399,11 @@ impl<T: Lane> Target<'_, T> {
     #[inline(always)]
     fn project_direction<const FORM: u8, const WANTED: u16>(
         &self,
-        joints: &[usize],
-        v: V3<T>,
-        linear: &[V3<T::Cell>],
+        joint: &KernelJoint,
+        range: Range<usize>,
+        (v, linear): (V3<T>, &[V3<T::Cell>]),
         map: &WrenchMap<T>,
-        rows: &mut [T::Cell],
+        cells: &mut [T::Cell],
     ) {
         let mut tensor = [v[0]; 6];
         for k in 0..6 {
@@ -366,9 +411,9 @@ impl<T: Lane> Target<'_, T> {
                 tensor[k] = map.tensor_entry::<FORM>(k, v);
             }
         }
-        for &i in joints {
-            let row = self.row(i, rows);
-            let f = read(self.at, &linear[i]);
+        for k in range {
+            let row = self.row::<WANTED>(joint, k, cells);
+            let f = read(self.at, &linear[k]);
             for k in 0..10 {
                 if self.link.wants::<WANTED>(k) {
                     let entry = if k < 6 {
@@ -376,7 +421,7 @@ impl<T: Lane> Target<'_, T> {
                     } else {
                         map.moment_entry::<FORM>(k, v, f)
                     };
-                    self.link.put(self.at, k, row, entry);
+                    self.put::<WANTED>(k, row, entry);
                 }
             }
         }
@@ -390,14 +435,14 @@ impl<T: Lane> Target<'_, T> {
         map: &WrenchMap<T>,
         (rotation, translation): (&[[f64; 3]; 3], [f64; 3]),
         kinematics: &Kinematics<T::Cell>,
-        rows: &mut [T::Cell],
+        cells: &mut [T::Cell],
     ) {
         let map = WrenchMap::new(&map.motion_at(rotation, translation));
         for d in &joint.directions {
-            for &i in &joint.path[d.range.clone()] {
-                let axis = kinematics.axis::<T>(self.at, self.j, d, i);
+            for k in d.range.clone() {
+                let axis = kinematics.axis::<T>(self.at, self.j, d, k);
                 let axis = axis.at(rotation, translation);
-                let row = self.row(i, rows);
+                let row = self.row::<ASK>(joint, k, cells);
                 for k in 0..10 {
                     if self.link.wants::<ASK>(k) {
                         let entry = if k < 6 {
@@ -405,15 +450,28 @@ impl<T: Lane> Target<'_, T> {
                         } else {
                             map.moment_entry::<ANY>(k, axis.angular, axis.linear)
                         };
-                        self.link.put(self.at, k, row, entry);
+                        self.put::<ASK>(k, row, entry);
                     }
                 }
             }
         }
     }
 
+    /// The link's cells in the row of the `k`-th joint on its path.
     #[inline(always)]
-    fn row<'r>(&self, i: usize, rows: &'r mut [T::Cell]) -> &'r mut [T::Cell] {
-        &mut rows[i * self.p..][..self.p]
+    fn row<'r, const WANTED: u16>(
+        &self,
+        joint: &KernelJoint,
+        k: usize,
+        cells: &'r mut [T::Cell],
+    ) -> &'r mut [T::Cell] {
+        let first = self.layout.row(self.j, k, joint.path[k]);
+        &mut cells[first..][..self.layout.length::<WANTED>(self.link)]
+    }
+
+    #[inline(always)]
+    fn put<const WANTED: u16>(&self, k: usize, row: &mut [T::Cell], value: T) {
+        self.layout
+            .put::<T, WANTED>(self.at, self.link, k, row, value);
     }
 }
