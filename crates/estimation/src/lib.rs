@@ -38,6 +38,7 @@ mod error;
 mod essential;
 mod householder;
 mod information;
+mod jackknife;
 mod noise;
 mod partial;
 mod products;

@@ -3,10 +3,10 @@
 use crate::autocorrelation::effective_sample_size;
 use crate::error::Error;
 use crate::information::InformationFactor;
+use crate::jackknife::BlockJackknife;
 use crate::noise::NoiseCovariance;
 use crate::quantile::student_t_quantile;
 use crate::robust::{HUBER_K, MAD_TO_SIGMA, RobustLoss};
-use crate::sandwich::sandwich_covariance;
 use crate::solve::{Estimate, RankDeficiency, Solution, solve};
 use crate::weighted::Weighting;
 use faer::Mat;
@@ -63,8 +63,8 @@ pub struct PartialEstimate {
     pub weights: Vec<f64>,
     /// Triangle of the whitened rows, for tests of what the fit can do without.
     pub factor: InformationFactor,
-    /// Standard deviation of each value that holds for noise which remembers: the larger of the white one and that of the sandwich over
-    /// blocks of consecutive samples.
+    /// Standard deviation of each value that holds for noise which remembers: the larger of the white one and that of the fits without
+    /// one block of consecutive samples.
     pub standard_deviation: Vec<f64>,
     /// Covariance with these standard deviations and the correlations of the white one.
     pub covariance: Mat<f64>,
@@ -82,7 +82,7 @@ pub struct PartialEstimate {
 ///
 /// A sample whose rows are not all used is whitened with the covariance of those that are. Robust weights `v` stand for noise of
 /// covariance `V^-½ Ω V^-½`. `Err` of the inner result: the columns of the used rows are dependent.
-/// Sources: Gautier & Poignet 2001; Zellner 1962; Huber 1981; White 1980 for the blocks.
+/// Sources: Gautier & Poignet 2001; Zellner 1962; Huber 1981; Bell & McCaffrey 2002 for the blocks.
 ///
 /// # Errors
 /// As [`InformationFactor::push_rows`] and [`solve`]; [`Error::NotPositiveDefinite`] for a joint that fits exactly or whose
@@ -197,38 +197,29 @@ impl PartialEstimate {
         self.block_samples = ((BLOCK_MEMORIES * memory).ceil() as usize)
             .min(n_samples / FEWEST_BLOCKS)
             .max(1);
-        let mut meat = InformationFactor::new(n);
-        let (mut score, mut n_blocks) = (vec![0.0; n], 0_usize);
+        let parts = self.factor.parts();
+        let mut jackknife = BlockJackknife::new(parts.r.as_ref());
         let mut whitener = Whitener::new(&self.noise);
         for sample in 0..n_samples {
             let (w, y) = whitener.sample(rows, sample, &self.weights)?;
             for (row, y) in w.chunks_exact(n).zip(y) {
-                let e = y - dot(row, &self.estimate.values);
-                for (s, w) in score.iter_mut().zip(row) {
-                    *s += e * w;
-                }
+                jackknife.push(row, y - dot(row, &self.estimate.values));
             }
             if (sample + 1) % self.block_samples == 0 || sample + 1 == n_samples {
-                meat.push_rows(&score, &[0.0])?;
-                score.fill(0.0);
-                n_blocks += 1;
+                jackknife.end_block();
             }
         }
-        let Some(sandwich) = sandwich_covariance(&self.factor, &meat)? else {
-            return Ok(());
-        };
-        // The small-sample factor of clustered covariances (Cameron & Miller 2015).
-        let (g, m) = ((n_blocks as f64).max(2.0), self.estimate.n_rows as f64);
-        let clusters = g / (g - 1.0) * (m - 1.0) / (m - n as f64);
-        // What two neighbouring blocks share is missing from both: half a memory at each end.
-        let ends = 1.0 / (1.0 - 0.5 / BLOCK_MEMORIES);
+        // What neighbouring blocks share is missing from both: a block of L samples of noise with a memory of m lacks
+        // (m - 1/m)/2L of its variance, exactly so for first-order noise.
+        let ends =
+            1.0 / (1.0 - (memory - 1.0 / memory) / (2.0 * self.block_samples as f64)).max(0.5);
         // Few blocks know their own scatter badly: Student's quantile in place of the normal one at 95 %.
-        let few = student_t_quantile(0.975, g - 1.0) / NORMAL_QUANTILE;
-        let small = clusters * ends * few * few;
-        for k in 0..n {
-            let blocks = (small * sandwich[(k, k)]).sqrt();
+        let freedom = (jackknife.n_blocks() as f64 - 1.0).max(1.0);
+        let few = student_t_quantile(0.975, freedom) / NORMAL_QUANTILE;
+        for (deviation, variance) in self.standard_deviation.iter_mut().zip(jackknife.variance()) {
+            let blocks = few * (ends * variance).sqrt();
             if blocks.is_finite() {
-                self.standard_deviation[k] = self.standard_deviation[k].max(blocks);
+                *deviation = deviation.max(blocks);
             }
         }
         let white = &self.estimate.standard_deviation;
