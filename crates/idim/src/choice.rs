@@ -80,7 +80,8 @@ const REVERSAL_SPEEDS: [f64; 3] = [0.001, 0.005, 0.02];
 /// Speed of reversal of a first fit, rad/s.
 const FIRST_REVERSAL: f64 = 0.005;
 
-fn first_reversals(robot: &Robot) -> Vec<f64> {
+/// Speed of reversal of each joint, rad/s (m/s), of a first fit.
+pub(crate) fn first_reversals(robot: &Robot) -> Vec<f64> {
     let joints = 0..robot.n_joints();
     joints
         .map(|j| reversal_of(robot, j, FIRST_REVERSAL))

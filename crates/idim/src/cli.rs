@@ -117,7 +117,7 @@ pub struct IdentifyArgs {
     /// Take q, qd, qdd and torque as they are: no filter, no differentiation, no decimation.
     #[arg(long)]
     pub as_recorded: bool,
-    /// Low-pass of positions and velocities, Hz (default: from the motion's bandwidth).
+    /// Low-pass of positions and velocities, Hz (default: by the error on blocks held out).
     #[arg(long, value_name = "HZ", value_parser = parse_positive)]
     pub cutoff: Option<f64>,
     /// Rows a second after the parallel decimation, Hz (default: from the cutoff).
@@ -126,8 +126,9 @@ pub struct IdentifyArgs {
     /// Differentiate positions though velocities are recorded.
     #[arg(long)]
     pub derive_velocity: bool,
-    /// Leave out the rows of a joint slower than this, rad/s (m/s): one number, or one a joint.
-    #[arg(long, value_name = "SPEED", value_delimiter = ',', value_parser = parse_positive)]
+    /// Leave out the rows of a joint slower than this, rad/s (m/s): one number, or one a joint; 0 for none (default: a
+    /// fiftieth of its largest speed).
+    #[arg(long, value_name = "SPEED", value_delimiter = ',', value_parser = parse_speed)]
     pub dead_band: Vec<f64>,
     /// Friction terms, of all joints or of one.
     #[arg(
@@ -415,6 +416,15 @@ fn parse_positive(text: &str) -> Result<f64, String> {
         Ok(number)
     } else {
         Err(format!("`{text}` is not a number above zero"))
+    }
+}
+
+fn parse_speed(text: &str) -> Result<f64, String> {
+    let number: f64 = text.trim().parse().unwrap_or(f64::NAN);
+    if number >= 0.0 && number.is_finite() {
+        Ok(number)
+    } else {
+        Err(format!("`{text}` is not a speed of zero or above"))
     }
 }
 

@@ -40,7 +40,7 @@ pub struct LoadedRuns {
     /// Take q, qd, qdd and torque as they are.
     #[arg(long)]
     pub as_recorded: bool,
-    /// Low-pass of positions and velocities, Hz (default: from the motion's bandwidth).
+    /// Low-pass of positions and velocities, Hz (default: by the error on blocks held out).
     #[arg(long, value_name = "HZ")]
     pub cutoff: Option<f64>,
     /// Finding of the log doctor that does not stop the run, CODE or CODE:JOINT; may be repeated.

@@ -120,7 +120,7 @@ fn solved(rows: &Rows, n: usize, options: &EstimationOptions) -> Result<Option<S
     }))
 }
 
-fn factor_of_used(rows: &Rows, n: usize) -> Result<InformationFactor, Error> {
+pub(crate) fn factor_of_used(rows: &Rows, n: usize) -> Result<InformationFactor, Error> {
     let p = rows.w.len().checked_div(rows.y.len()).unwrap_or(0);
     debug_assert_eq!(rows.y.len() % n, 0);
     let mut factor = InformationFactor::new(p);
@@ -274,7 +274,7 @@ fn essential(
 }
 
 /// The rows with these columns alone.
-fn only(rows: &Rows, p: usize, kept: &[usize]) -> Rows {
+pub(crate) fn only(rows: &Rows, p: usize, kept: &[usize]) -> Rows {
     let mut w = Vec::with_capacity(rows.y.len() * kept.len());
     for row in rows.w.chunks_exact(p) {
         w.extend(kept.iter().map(|&k| row[k]));

@@ -10,7 +10,8 @@ use crate::load::LoadedRobot;
 use crate::plan::{SamplingOptions, SamplingPlan};
 use crate::report_html::{LogSummary, Spectrum, summaries};
 use crate::result::{ErrorResult, IdentificationResult, JointError, SCHEMA};
-use crate::samples::{Stretch, decimator, predict, stretches};
+use crate::samples::{Stretch, all_stretches, decimator, predict};
+use crate::sampling_choice::{Sampling, choose_sampling};
 use crate::standstill::standstill_warnings;
 use crate::structure::Structure;
 use faer::Mat;
@@ -105,10 +106,14 @@ pub fn identify(
         (training, validation)
     };
     let plan = SamplingPlan::new(&training, &options.sampling);
+    let at_first = all_stretches(&training, &plan)?;
+    let plan = with_own_dead_band(robot, plan, &at_first, options);
+    drop(at_first);
+    let Sampling { plan, cutoff } = choose_sampling(robot, &training, plan, options)?;
     let mut train = all_stretches(&training, &plan)?;
     let mut held_out = all_stretches(&validation, &plan)?;
     for part in [&train, &held_out] {
-        warnings.extend(standstill_warnings(robot, part, &plan, options));
+        warnings.extend(standstill_warnings(robot, part, options));
     }
     let Found {
         structure,
@@ -152,6 +157,7 @@ pub fn identify(
         inferred: Vec::new(),
         findings: Vec::new(),
         conditioning: plan.choices.clone(),
+        cutoff,
         warnings,
     };
     Ok(Identification {
@@ -177,9 +183,26 @@ fn split(m: &Measurements) -> (Measurements, Measurements) {
     (m.slice(0..cut), m.slice(cut..n))
 }
 
-fn all_stretches(logs: &[Measurements], plan: &SamplingPlan) -> Result<Vec<Stretch>, Error> {
-    let parts: Result<Vec<_>, _> = logs.iter().map(|m| stretches(m, plan)).collect();
-    Ok(parts?.into_iter().flatten().collect())
+/// Share of a joint's largest speed below which friction may point either way: static friction takes any value up to Coulomb's.
+const AT_REST: f64 = 0.02;
+
+/// A dead band where Coulomb friction is asked for and the options leave it open.
+fn with_own_dead_band(
+    robot: &Robot,
+    plan: SamplingPlan,
+    train: &[Stretch],
+    options: &IdentifyOptions,
+) -> SamplingPlan {
+    let coulomb = options.columns.coulomb || options.friction != FrictionChoice::Plain;
+    if !coulomb || options.sampling.as_recorded || !options.sampling.dead_band.is_empty() {
+        return plan;
+    }
+    let own = |joint: usize| {
+        let speeds = train.iter().flat_map(|s| s.states.qd(joint));
+        AT_REST * speeds.fold(0.0, |m: f64, v| m.max(v.abs()))
+    };
+    let why = "a fiftieth of its largest speed: at rest friction may point either way";
+    plan.with_dead_band((0..robot.n_joints()).map(own).collect(), why)
 }
 
 /// Held-out torques as the fit sees them: filtered and decimated alike, rows within the dead band left out.

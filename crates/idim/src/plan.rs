@@ -10,14 +10,28 @@ use rustfft::num_complex::Complex;
 pub struct SamplingOptions {
     /// Take q, q̇, q̈ and torque as they are.
     pub as_recorded: bool,
-    /// Low-pass of positions and velocities, Hz; from the bandwidth of the motion where `None`.
+    /// Low-pass of positions and velocities, Hz; by the error on blocks held out where `None`.
     pub cutoff: Option<f64>,
     /// Rows a second after the parallel decimation, Hz; from the cutoff where `None`. 20 to 100 typical.
     pub rate: Option<f64>,
     /// Differentiate positions though velocities are recorded.
     pub derive_velocity: bool,
-    /// Speed below which a joint's rows are left out, rad/s (m/s): one for all, or one a joint; 0.05 to 0.1 typical.
+    /// Speed below which a joint's rows are left out, rad/s (m/s): one for all, or one a joint; 0.05 to 0.1 typical, 0 for
+    /// none. A fiftieth of each joint's largest speed where empty and Coulomb friction is asked for.
     pub dead_band: Vec<f64>,
+}
+
+/// What the training logs say of their sampling.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Motion {
+    /// Bandwidth of the velocities, Hz.
+    pub(crate) bandwidth: f64,
+    /// Lowest sample rate, Hz.
+    pub(crate) rate: f64,
+    /// Duration of the shortest log, s.
+    pub(crate) shortest: f64,
+    /// Whether recorded velocities serve.
+    pub(crate) recorded: bool,
 }
 
 /// Parallel low-pass and decimation of regressor and torque.
@@ -32,8 +46,12 @@ pub(crate) enum Parallel {
 /// How the samples of all logs are made, decided once from the data.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SamplingPlan {
+    /// What the choices rest on; `None` takes q, q̇, q̈ as recorded.
+    pub(crate) motion: Option<Motion>,
     /// Low-pass of positions and velocities, Hz; `None` takes q, q̇, q̈ as recorded.
     pub(crate) cutoff: Option<f64>,
+    /// Left out at both ends of a stretch, s; where `None`, until the low-pass has settled.
+    pub(crate) trim: Option<f64>,
     /// Parallel low-pass of regressor and torque, and the rows kept after it.
     pub(crate) parallel: Option<Parallel>,
     /// Whether the recorded velocity serves, or positions are differentiated.
@@ -53,6 +71,8 @@ pub(crate) const PASS_BAND: f64 = 0.8;
 const BANDWIDTH_SHARE: f64 = 0.99;
 /// Low-pass of the positions, in bandwidths: far enough that the motion passes untouched.
 const POSITION_CUTOFF: f64 = 20.0;
+/// Highest cutoff as a share of the sample rate.
+const HIGHEST_CUTOFF: f64 = 0.4;
 /// Half the rate after decimation, in cutoffs of the parallel low-pass.
 const DECIMATED_BAND: f64 = 1.25;
 
@@ -60,27 +80,34 @@ impl SamplingPlan {
     /// From the options, and from the bandwidth of the motion in the training logs where they leave a choice.
     pub(crate) fn new(training: &[Measurements], options: &SamplingOptions) -> Self {
         let n = training.first().map_or(0, Measurements::n_joints);
-        let mut plan = if options.as_recorded {
+        let plan = if options.as_recorded {
             Self::as_recorded()
         } else {
-            Self::from_motion(training, options)
+            let motion = Motion::of(training, options);
+            let cutoff = options.cutoff.unwrap_or_else(|| motion.far_cutoff());
+            let why = if options.cutoff.is_some() {
+                "as stated"
+            } else {
+                "20 bandwidths of the motion"
+            };
+            Self::of_motion(motion, cutoff, cutoff, why, options)
         };
-        plan.reversal = vec![0.0; n];
-        if !options.dead_band.is_empty() {
-            plan.dead_band = (0..n)
-                .map(|j| options.dead_band[j.min(options.dead_band.len() - 1)])
-                .collect();
-            plan.choices.push(format!(
-                "dead band: rows of a joint slower than {} rad/s left out, as stated",
-                texts(&options.dead_band)
-            ));
+        let plan = Self {
+            reversal: vec![0.0; n],
+            ..plan
+        };
+        if options.dead_band.is_empty() {
+            return plan;
         }
-        plan
+        let of = |j: usize| options.dead_band[j.min(options.dead_band.len() - 1)];
+        plan.with_dead_band((0..n).map(of).collect(), "as stated")
     }
 
     fn as_recorded() -> Self {
         Self {
+            motion: None,
             cutoff: None,
+            trim: None,
             parallel: None,
             derivatives: Derivatives::OfVelocities,
             dead_band: Vec::new(),
@@ -92,41 +119,65 @@ impl SamplingPlan {
         }
     }
 
-    fn from_motion(training: &[Measurements], options: &SamplingOptions) -> Self {
-        let recorded = !options.derive_velocity && training.iter().all(|m| m.qd.is_some());
-        let (mut band, mut rate) = (0.0_f64, f64::INFINITY);
-        for m in training {
-            let dt = median_interval(&m.time);
-            rate = rate.min(1.0 / dt);
-            for j in 0..m.n_joints() {
-                let velocity = match &m.qd {
-                    Some(qd) if recorded => qd[j].clone(),
-                    _ => m.q[j].windows(2).map(|w| (w[1] - w[0]) / dt).collect(),
-                };
-                band = band.max(bandwidth(&velocity, dt));
-            }
-        }
-        let cutoff = options
-            .cutoff
-            .unwrap_or_else(|| (POSITION_CUTOFF * band).min(0.4 * rate));
-        let factor = ((0.5 * rate / (DECIMATED_BAND * cutoff)).floor() as usize).max(1);
+    /// With a cutoff, Hz, for the states, and one for the parallel low-pass where the options leave its rate open.
+    fn of_motion(
+        motion: Motion,
+        cutoff: f64,
+        parallel: f64,
+        why: &str,
+        options: &SamplingOptions,
+    ) -> Self {
         let parallel = match options.rate {
             Some(wanted) => Parallel::ToRate(wanted),
             // A cutoff above the highest that a decimated rate can have leaves the rows as they are.
-            None => Parallel::Butterworth { cutoff, factor },
+            None => Parallel::Butterworth {
+                cutoff: parallel,
+                factor: ((0.5 * motion.rate / (DECIMATED_BAND * parallel)).floor() as usize).max(1),
+            },
         };
         Self {
+            motion: Some(motion),
             cutoff: Some(cutoff),
+            trim: None,
             parallel: Some(parallel),
-            derivatives: if recorded {
+            derivatives: if motion.recorded {
                 Derivatives::OfVelocities
             } else {
                 Derivatives::OfPositions
             },
             dead_band: Vec::new(),
             reversal: Vec::new(),
-            choices: choices(band, recorded, cutoff, parallel, options),
+            choices: choices(motion, cutoff, parallel, why),
         }
+    }
+
+    /// The same plan with another cutoff of the states; regressor and torque stay in the same band.
+    pub(crate) fn with_cutoff(&self, cutoff: f64, why: &str, options: &SamplingOptions) -> Self {
+        let Some(motion) = self.motion else {
+            return self.clone();
+        };
+        let mut plan = Self {
+            reversal: self.reversal.clone(),
+            dead_band: self.dead_band.clone(),
+            ..Self::of_motion(motion, cutoff, motion.far_cutoff(), why, options)
+        };
+        let said = self.choices.iter().skip(plan.choices.len()).cloned();
+        plan.choices.extend(said);
+        plan
+    }
+
+    /// The same plan with a dead band, rad/s (m/s), joint by joint.
+    pub(crate) fn with_dead_band(mut self, dead_band: Vec<f64>, why: &str) -> Self {
+        self.choices.push(if dead_band.iter().any(|v| *v > 0.0) {
+            format!(
+                "dead band: rows of a joint slower than {} rad/s left out, {why}",
+                texts(&dead_band)
+            )
+        } else {
+            format!("dead band: none, {why}")
+        });
+        self.dead_band = dead_band;
+        self
     }
 
     /// The same plan with the Coulomb torque of each joint smoothed over a speed, rad/s (m/s).
@@ -141,49 +192,77 @@ impl SamplingPlan {
     }
 }
 
-/// One number where all are the same, else all.
+impl Motion {
+    fn of(training: &[Measurements], options: &SamplingOptions) -> Self {
+        let recorded = !options.derive_velocity && training.iter().all(|m| m.qd.is_some());
+        let mut motion = Self {
+            bandwidth: 0.0,
+            rate: f64::INFINITY,
+            shortest: f64::INFINITY,
+            recorded,
+        };
+        for m in training {
+            let dt = median_interval(&m.time);
+            motion.rate = motion.rate.min(1.0 / dt);
+            motion.shortest = motion.shortest.min(dt * m.n_samples() as f64);
+            for j in 0..m.n_joints() {
+                let velocity = match &m.qd {
+                    Some(qd) if recorded => qd[j].clone(),
+                    _ => m.q[j].windows(2).map(|w| (w[1] - w[0]) / dt).collect(),
+                };
+                motion.bandwidth = motion.bandwidth.max(bandwidth(&velocity, dt));
+            }
+        }
+        motion
+    }
+
+    /// A cutoff far above the motion, Hz.
+    pub(crate) fn far_cutoff(&self) -> f64 {
+        (POSITION_CUTOFF * self.bandwidth).min(self.highest_cutoff())
+    }
+
+    /// Highest cutoff a low-pass can have, Hz: beyond it the bilinear transform bends it out of shape.
+    pub(crate) fn highest_cutoff(&self) -> f64 {
+        HIGHEST_CUTOFF * self.rate
+    }
+}
+
+/// One number where all are the same, else all; three digits.
 fn texts(numbers: &[f64]) -> String {
     let shown = if numbers.iter().all(|v| *v == numbers[0]) {
         &numbers[..1]
     } else {
         numbers
     };
-    let words: Vec<String> = shown.iter().map(f64::to_string).collect();
+    let three = |v: &f64| format!("{v:.2e}").parse().unwrap_or(*v).to_string();
+    let words: Vec<String> = shown.iter().map(three).collect();
     words.join(", ")
 }
 
-fn choices(
-    band: f64,
-    recorded: bool,
-    cutoff: f64,
-    parallel: Parallel,
-    options: &SamplingOptions,
-) -> Vec<String> {
-    let stated = |fixed: bool| if fixed { ", as stated" } else { "" };
+fn choices(motion: Motion, cutoff: f64, parallel: Parallel, why: &str) -> Vec<String> {
     vec![
         format!(
-            "bandwidth of the motion: {band:.3} Hz ({:.0} % of the energy of the velocities)",
+            "bandwidth of the motion: {:.3} Hz ({:.0} % of the energy of the velocities)",
+            motion.bandwidth,
             100.0 * BANDWIDTH_SHARE
         ),
         format!(
-            "low-pass of positions and velocities: {cutoff:.2} Hz, zero-phase Butterworth of order {ORDER}{}",
-            stated(options.cutoff.is_some())
+            "low-pass of positions and velocities: {cutoff:.2} Hz, zero-phase Butterworth of order {ORDER}, {why}"
         ),
         format!(
             "velocities: {}",
-            if recorded {
+            if motion.recorded {
                 "recorded, low-passed; accelerations from them"
             } else {
                 "from positions"
             }
         ),
         match parallel {
-            Parallel::Butterworth { factor, .. } => format!(
-                "parallel decimation of regressor and torque: one sample in {factor}, after the same low-pass"
+            Parallel::Butterworth { cutoff, factor } => format!(
+                "parallel decimation of regressor and torque: one sample in {factor}, after a Butterworth low-pass at {cutoff:.2} Hz"
             ),
             Parallel::ToRate(rate) => format!(
-                "parallel decimation of regressor and torque: to {rate} Hz, after a Butterworth low-pass at 0.8 of half that rate{}",
-                stated(true)
+                "parallel decimation of regressor and torque: to {rate} Hz, after a Butterworth low-pass at 0.8 of half that rate, as stated"
             ),
         },
     ]

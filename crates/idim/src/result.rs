@@ -54,8 +54,22 @@ pub struct IdentificationResult {
     /// How the log became samples, one sentence a choice.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub conditioning: Vec<String>,
+    /// Error on blocks held out over the cutoff of the low-pass, Hz, where it was chosen by it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cutoff: Option<HeldOutChoice>,
     /// What a reader must know before trusting the numbers.
     pub warnings: Vec<String>,
+}
+
+/// A number chosen by the error of the predicted torque on blocks held out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HeldOutChoice {
+    /// What was tried, rising.
+    pub tried: Vec<f64>,
+    /// Relative error of each on the blocks, each joint in units of its residual; `null` where not determined.
+    pub held_out_error: Vec<Option<f64>>,
+    /// The one taken.
+    pub chosen: f64,
 }
 
 /// Categories of the parameters.

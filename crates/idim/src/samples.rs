@@ -63,6 +63,7 @@ pub(crate) fn stretches(
             cutoff,
         }),
         derivatives: plan.derivatives,
+        trim: plan.trim,
         ..ConditioningOptions::default()
     };
     let conditioned = condition(measured, &options)?;
@@ -77,6 +78,18 @@ pub(crate) fn stretches(
             load: None,
         })
         .collect())
+}
+
+/// The stretches of several logs.
+///
+/// # Errors
+/// As [`stretches`].
+pub(crate) fn all_stretches(
+    logs: &[Measurements],
+    plan: &SamplingPlan,
+) -> Result<Vec<Stretch>, Error> {
+    let parts: Result<Vec<_>, _> = logs.iter().map(|m| stretches(m, plan)).collect();
+    Ok(parts?.into_iter().flatten().collect())
 }
 
 /// Rows of W and y, sample by sample: row `sample · n_joints + joint`, row-major.

@@ -2,7 +2,6 @@
 
 use crate::friction::FrictionChoice;
 use crate::identify::IdentifyOptions;
-use crate::plan::SamplingPlan;
 use crate::samples::{Stretch, median_interval};
 use idim_model::{JointKind, Robot};
 
@@ -15,15 +14,14 @@ const SHORTEST: f64 = 0.2;
 /// Share of the samples above which it biases Coulomb friction by more than its standard deviation.
 const SHARE: f64 = 0.02;
 
-/// One sentence a log where all joints stand still for long, unless a dead band leaves those rows out or no Coulomb friction is asked for.
+/// One sentence a log where all joints stand still for long, unless a dead band is stated or no Coulomb friction is asked for.
 pub(crate) fn standstill_warnings(
     robot: &Robot,
     stretches: &[Stretch],
-    plan: &SamplingPlan,
     options: &IdentifyOptions,
 ) -> Vec<String> {
     let coulomb = options.columns.coulomb || options.friction != FrictionChoice::Plain;
-    if !coulomb || plan.dead_band.iter().any(|b| *b > 0.0) {
+    if !coulomb || !options.sampling.dead_band.is_empty() {
         return Vec::new();
     }
     stretches.iter().filter_map(|s| warning(robot, s)).collect()
@@ -56,7 +54,7 @@ fn warning(robot: &Robot, stretch: &Stretch) -> Option<String> {
     let share = total as f64 / n as f64;
     let first = first.filter(|_| share > SHARE)?;
     Some(format!(
-        "standstill: {}: all joints stand still in {:.0} % of the samples from {:.2} to {:.2} s, first at t = {:.3} s; friction holds either way there, so Coulomb friction and offsets are biased; leave slow rows out with --dead-band 0.1, or cut the log",
+        "standstill: {}: all joints stand still in {:.0} % of the samples from {:.2} to {:.2} s, first at t = {:.3} s; friction holds either way there, and a fit that believes these rows biases Coulomb friction and offsets; leave slow rows out with --dead-band 0.1, or cut the log",
         stretch.file,
         100.0 * share,
         stretch.time[0],

@@ -1,11 +1,11 @@
 //! From what a run has at hand to the parts of a report.
 
-use super::data::{LogSummary, ReportData, ReportedFinding};
+use super::data::{CutoffCurve, LogSummary, ReportData, ReportedFinding};
 use super::report_html;
 use crate::check::CheckedFinding;
 use crate::identify::{Identification, Prediction, TRAINING_SHARE};
 use crate::log_spec::LogSpec;
-use crate::result::IdentificationResult;
+use crate::result::{HeldOutChoice, IdentificationResult};
 use idim_measurement::Measurements;
 use idim_measurement::doctor::Severity;
 use idim_model::Robot;
@@ -93,6 +93,17 @@ fn reported(checked: &CheckedFinding) -> ReportedFinding {
     }
 }
 
+/// The curve of a cutoff chosen by it, without the cutoffs that were not determined.
+fn curve(choice: &HeldOutChoice) -> CutoffCurve {
+    let tried = choice.tried.iter().zip(&choice.held_out_error);
+    let (cutoff, error) = tried.filter_map(|(c, e)| Some((*c, (*e)?))).unzip();
+    CutoffCurve {
+        cutoff,
+        error,
+        chosen: choice.chosen,
+    }
+}
+
 /// The page of an identification from logs.
 pub(crate) fn page_of_logs(
     found: &Identification,
@@ -101,13 +112,14 @@ pub(crate) fn page_of_logs(
     settings: &[(String, String)],
 ) -> String {
     let findings: Vec<ReportedFinding> = found.result.findings.iter().map(reported).collect();
+    let cutoff = found.result.cutoff.as_ref().map(curve);
     report_html(&ReportData {
         result: &found.result,
         robot,
         predictions: &found.predictions,
         logs: &found.logs,
         spectrum: Some(&found.spectrum),
-        cutoff: None,
+        cutoff: cutoff.as_ref(),
         findings: Some(&findings),
         figures: &[],
         paper: None,
