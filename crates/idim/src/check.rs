@@ -5,21 +5,24 @@
 
 mod command;
 mod consistency;
+mod diagnosis;
 mod faults;
 mod moments;
 mod prior;
+mod proportions;
 mod readings;
 mod rows;
+mod suspicions;
 mod text;
+mod verdict;
 
 pub use command::CheckArgs;
 pub(crate) use command::run_check;
+pub use diagnosis::diagnose;
 pub use text::check_text;
 
 use crate::error::Error;
-use idim_measurement::doctor::{Finding, Severity, examine_log};
-use idim_measurement::{Log, Measurements, Place};
-use idim_model::Robot;
+use idim_measurement::doctor::{Finding, Severity};
 use serde::Serialize;
 use std::str::FromStr;
 
@@ -140,138 +143,4 @@ pub fn gate(findings: &[CheckedFinding]) -> Result<(), Error> {
             })
         }
     }
-}
-
-/// A clock or positions so broken that a motion cannot be made of them.
-const NO_MOTION: [&str; 3] = ["time-unit", "position-jump", "gaps"];
-/// What is said of a torque factor that another finding names better.
-const UNNAMED: &str = "torque-scale";
-/// Names of torque factors.
-const NAMED: [&str; 3] = ["gear-side", "torque-unit", "torque-is-current"];
-
-/// Everything that can be said against logs of one robot: log by log, and, where there are several, of them together.
-///
-/// The last element belongs to all logs; it is empty for a single one. Each is sorted, most serious first.
-///
-/// # Panics
-/// If a log was read for another number of joints.
-#[track_caller]
-pub fn diagnose(logs: &[Log], robot: &Robot) -> Vec<Vec<Finding>> {
-    let mut all = Vec::new();
-    let (mut together, mut names) = (Vec::new(), Vec::new());
-    for log in logs {
-        let (findings, samples) = diagnose_one(log, robot);
-        let spoilt = findings.iter().any(|f| f.severity == Severity::Error);
-        all.push(findings);
-        // A log with a fault of its own would blur what the others agree about.
-        if let Some(samples) = samples.filter(|_| !spoilt) {
-            together.push(samples);
-            names.push(log.file.as_str());
-        }
-    }
-    let mut of_all = Vec::new();
-    if together.len() > 1 {
-        let examination = consistency::examine(&together, robot);
-        of_all = consistency::findings(&examination, robot, &names.join(" + "));
-    }
-    all.push(tidied(of_all));
-    all
-}
-
-fn diagnose_one(log: &Log, robot: &Robot) -> (Vec<Finding>, Option<rows::Samples>) {
-    let mut out = examine_log(log, robot);
-    let inferred = |n: &&String| n.starts_with("time unit inferred");
-    if let Some(note) = log.notes.iter().find(inferred) {
-        out.push(Finding {
-            code: "time-unit",
-            severity: Severity::Warning,
-            place: Place::file(&log.file),
-            value: None,
-            met: note.clone(),
-            rule: "a clock says its unit".into(),
-            next_step: "name the column with its unit, for example `t_ms`".into(),
-        });
-    }
-    let broken = |f: &Finding| f.severity == Severity::Error && NO_MOTION.contains(&f.code);
-    let mut samples = None;
-    if !out.iter().any(broken) {
-        match Measurements::from_log(log, robot) {
-            Ok(mut measured) => {
-                measured.qd = None;
-                samples = rows::Samples::new(&measured);
-                let mut found = of_measurements(&measured, samples.as_ref(), robot);
-                if stands_mostly(&out) {
-                    suspect_only(&mut found);
-                }
-                out.extend(found);
-            }
-            Err(error) => out.push(Finding::from(&error)),
-        }
-    }
-    (tidied(out), samples)
-}
-
-/// A log that stands still for longer shows too little of the arm to be sure of what its torques contradict.
-const MOSTLY_STILL: f64 = 0.3;
-
-fn stands_mostly(findings: &[Finding]) -> bool {
-    let share = |f: &Finding| f.value.unwrap_or(0.0);
-    findings
-        .iter()
-        .any(|f| f.code == "standstill" && f.place.joint.is_none() && share(f) > MOSTLY_STILL)
-}
-
-fn suspect_only(findings: &mut [Finding]) {
-    for finding in findings {
-        if finding.severity == Severity::Error {
-            finding.severity = Severity::Warning;
-        }
-    }
-}
-
-fn of_measurements(
-    measured: &Measurements,
-    samples: Option<&rows::Samples>,
-    robot: &Robot,
-) -> Vec<Finding> {
-    let mut out = Vec::new();
-    if let Some(samples) = samples {
-        let examination = consistency::examine(std::slice::from_ref(samples), robot);
-        out.extend(consistency::findings(&examination, robot, &measured.file));
-        out.extend(prior::prior_masses(samples, robot, &measured.file));
-    }
-    let known: Vec<Option<String>> = out
-        .iter()
-        .filter(|f| NAMED.contains(&f.code))
-        .map(|f| f.place.joint.clone())
-        .collect();
-    let limits = prior::torque_limits(measured, robot);
-    out.extend(
-        limits
-            .into_iter()
-            .filter(|f| !known.contains(&f.place.joint)),
-    );
-    out
-}
-
-/// Most serious first, nothing twice.
-fn tidied(findings: Vec<Finding>) -> Vec<Finding> {
-    let named: Vec<Option<String>> = findings
-        .iter()
-        .filter(|f| NAMED.contains(&f.code))
-        .map(|f| f.place.joint.clone())
-        .collect();
-    let mut out: Vec<Finding> = Vec::new();
-    for finding in findings {
-        let same = |f: &Finding| (f.code, &f.place.joint) == (finding.code, &finding.place.joint);
-        // Two channels that saturate, or gaps at two places, are two findings of one kind.
-        let once = !["saturation", "sample-rate"].contains(&finding.code);
-        let better = finding.code == UNNAMED && named.contains(&finding.place.joint);
-        if better || once && out.iter().any(same) {
-            continue;
-        }
-        out.push(finding);
-    }
-    out.sort_by_key(|f| std::cmp::Reverse(f.severity));
-    out
 }

@@ -334,10 +334,11 @@ const JOINTS: [[&str; 6]; 3] = [
     ["joint1", "joint2", "joint3", "joint4", "joint5", "joint6"],
 ];
 
-/// Faults that must be named, of fifty. The KR300's small motions and elastic joints tell little: of its faults, a turned
-/// position, torques of one joint on the wrong side of the gear and another robot pass unnamed, as do two of the TX40's
-/// coupled wrist.
-const NAMED: usize = 44;
+/// Faults that must be named, of fifty.
+const NAMED: usize = 50;
+/// Errors that may be reported beside them: of a TX40 whose torques are all the joints', the sign of the one motor that
+/// turns against its joint is told as well.
+const BESIDES: usize = 1;
 
 #[test]
 fn oracle_fifty_planted_faults_are_named_and_good_logs_are_left_alone() {
@@ -380,4 +381,8 @@ fn oracle_fifty_planted_faults_are_named_and_good_logs_are_left_alone() {
     eprintln!("{}", missed.join("\n"));
     assert_eq!(planted, 50);
     assert!(named >= NAMED, "{named} of {planted}: {missed:#?}");
+    assert!(
+        besides <= BESIDES,
+        "{besides} other errors, {BESIDES} known"
+    );
 }

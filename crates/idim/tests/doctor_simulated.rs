@@ -17,9 +17,9 @@ use rand_distr::{Distribution, StandardNormal};
 const RATE: f64 = 100.0;
 const DURATION: f64 = 20.0;
 
-/// A log of a random smooth motion: torques of the robot file's masses, rotors and friction, with noise.
-fn simulated(text: &str, seed: u64) -> Case {
-    let robot = robot_from_ron(text).unwrap();
+/// A log of a random smooth motion, its slowest wave `slowest` Hz: torques of the robot file's masses, rotors and friction,
+/// with noise.
+fn simulated(robot: &Robot, seed: u64, slowest: f64) -> Case {
     let n = robot.n_joints();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let count = (RATE * DURATION) as usize;
@@ -30,7 +30,7 @@ fn simulated(text: &str, seed: u64) -> Case {
         let waves: Vec<[f64; 3]> = (1..=5)
             .map(|l| {
                 let l = f64::from(l);
-                let w = 2.0 * std::f64::consts::PI * l * (0.1 + 0.01 * j as f64);
+                let w = 2.0 * std::f64::consts::PI * l * (slowest + 0.01 * j as f64);
                 [
                     reach * rng.random_range(0.1..0.5) / l,
                     w,
@@ -49,7 +49,7 @@ fn simulated(text: &str, seed: u64) -> Case {
         }
     }
     let masses = robot.standard_parameters().unwrap();
-    let torque = inverse_dynamics_batch(&Model::new(&robot), &masses, &states);
+    let torque = inverse_dynamics_batch(&Model::new(robot), &masses, &states);
     let mut noise = |scale: f64| -> f64 {
         let e: f64 = StandardNormal.sample(&mut rng);
         scale * e
@@ -82,7 +82,7 @@ fn simulated(text: &str, seed: u64) -> Case {
         rows: (0..count)
             .map(|k| columns.iter().map(|c| c[k]).collect())
             .collect(),
-        robot: robot_to_ron(&without_masses(&robot)),
+        robot: robot_to_ron(&without_masses(robot)),
         odd: None,
     }
 }
@@ -165,55 +165,97 @@ fn drawn(rng: &mut ChaCha8Rng, robot: &Robot) -> Fault {
     }
 }
 
-/// Share of the faults that must be named: the last joint of an arm hardly speaks through the others.
-const NAMED: f64 = 0.8;
+/// What was planted and missed, and what was said of good logs and of others than the fault.
+#[derive(Default)]
+struct Count {
+    planted: usize,
+    missed: Vec<String>,
+    /// Of good logs.
+    alarms: Vec<String>,
+    /// Errors beside the fault.
+    besides: usize,
+}
+
+impl Count {
+    /// Plants faults drawn from `draw` in three logs of a robot.
+    fn plant(&mut self, robot: &Robot, draw: u64, seeds: std::ops::Range<u64>, slowest: f64) {
+        let joints: Vec<&str> = robot.joints().iter().map(|j| j.name.as_str()).collect();
+        let mut rng = ChaCha8Rng::seed_from_u64(draw);
+        for seed in seeds {
+            let good = simulated(robot, seed, slowest);
+            let found = findings(std::slice::from_ref(&good));
+            let serious = found.iter().filter(|f| f["severity"] != "note");
+            let named = serious.map(|f| format!("{} {seed}: {f}", robot.name()));
+            self.alarms.extend(named);
+            for _ in 0..5 {
+                let fault = drawn(&mut rng, robot);
+                let mut case = good.clone();
+                (fault.plant)(&mut case);
+                let found = findings(&[case]);
+                let errors = found.iter().filter(|f| f["severity"] == "error");
+                self.besides += errors.filter(|f| f["code"] != fault.code).count();
+                self.planted += 1;
+                if fault.named(&found, &joints) {
+                    continue;
+                }
+                let said: Vec<String> = found
+                    .iter()
+                    .filter(|f| f["severity"] != "note")
+                    .map(|f| format!("{} {} {}", f["code"], f["place"]["joint"], f["value"]))
+                    .collect();
+                let joint = fault.joint.map_or("-", |j| joints[j]);
+                self.missed.push(format!(
+                    "{} {seed}, {} of {joint}: said {}",
+                    robot.name(),
+                    fault.what,
+                    said.join("; ")
+                ));
+            }
+        }
+    }
+
+    fn named(&self) -> usize {
+        let named = self.planted - self.missed.len();
+        eprintln!(
+            "{named} of {} random faults named, {} other errors beside them, {} alarms\n{}",
+            self.planted,
+            self.besides,
+            self.alarms.len(),
+            self.missed.join("\n")
+        );
+        named
+    }
+}
+
+/// Of thirty. Degrees and a ratio of 72 are near each other: both leave a light wrist at rest.
+const NAMED: usize = 29;
 
 #[test]
 fn identity_random_faults_of_simulated_logs_are_named() {
-    let (mut planted, mut missed, mut alarms) = (0usize, Vec::new(), Vec::new());
+    let mut count = Count::default();
+    for (at, text) in [idim_fixtures::CRS_A460, idim_fixtures::PUMA560]
+        .into_iter()
+        .enumerate()
+    {
+        count.plant(&robot_from_ron(text).unwrap(), 7 + at as u64, 0..3, 0.1);
+    }
+    assert!(count.alarms.is_empty(), "{:#?}", count.alarms);
+    assert!(count.named() >= NAMED, "{:#?}", count.missed);
+}
+
+/// Of thirty, on motions and draws that nothing was set on.
+const NAMED_FRESH: usize = 29;
+
+#[test]
+fn identity_random_faults_of_fresh_motions_are_named() {
+    let mut count = Count::default();
     for (at, text) in [idim_fixtures::CRS_A460, idim_fixtures::PUMA560]
         .into_iter()
         .enumerate()
     {
         let robot = robot_from_ron(text).unwrap();
-        let joints: Vec<&str> = robot.joints().iter().map(|j| j.name.as_str()).collect();
-        let mut rng = ChaCha8Rng::seed_from_u64(7 + at as u64);
-        for seed in 0..3 {
-            let good = simulated(text, seed);
-            let found = findings(std::slice::from_ref(&good));
-            let serious = found.iter().filter(|f| f["severity"] != "note");
-            alarms.extend(serious.map(|f| format!("{} {seed}: {f}", robot.name())));
-            for _ in 0..5 {
-                let fault = drawn(&mut rng, &robot);
-                let mut case = good.clone();
-                (fault.plant)(&mut case);
-                let found = findings(&[case]);
-                planted += 1;
-                if !fault.named(&found, &joints) {
-                    let said: Vec<String> = found
-                        .iter()
-                        .filter(|f| f["severity"] != "note")
-                        .map(|f| format!("{} {} {}", f["code"], f["place"]["joint"], f["value"]))
-                        .collect();
-                    let joint = fault.joint.map_or("-", |j| joints[j]);
-                    missed.push(format!(
-                        "{} {seed}, {} of {joint}: said {}",
-                        robot.name(),
-                        fault.what,
-                        said.join("; ")
-                    ));
-                }
-            }
-        }
+        count.plant(&robot, 2028 + at as u64, 50..53, 0.06);
     }
-    let named = planted - missed.len();
-    eprintln!(
-        "{named} of {planted} random faults named\n{}",
-        missed.join("\n")
-    );
-    assert!(alarms.is_empty(), "{alarms:#?}");
-    assert!(
-        named as f64 >= NAMED * planted as f64,
-        "{named} of {planted}: {missed:#?}"
-    );
+    assert!(count.alarms.is_empty(), "{:#?}", count.alarms);
+    assert!(count.named() >= NAMED_FRESH, "{:#?}", count.missed);
 }

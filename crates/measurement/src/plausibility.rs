@@ -1,5 +1,6 @@
 //! Does the log mean what it says: clock in seconds, angles in radians, joints on the joint side.
 
+use crate::clock::GAP;
 use crate::error::{Error, Place};
 use crate::log::Log;
 use idim_model::{Joint, JointKind, Robot};
@@ -117,7 +118,7 @@ const STILL: f64 = 1e-4;
 
 /// Compares changes of position with the integral of the recorded velocity over spans of 0.1 s.
 ///
-/// `None` for a joint that hardly moves. Integrals stand noise that derivatives do not.
+/// `None` for a joint that hardly moves. Integrals stand noise that derivatives do not; spans across a gap say nothing.
 pub fn velocity_fit(time: &[f64], q: &[f64], qd: &[f64]) -> Option<VelocityFit> {
     let dt = median_interval(time);
     let span = ((COMPARED_SPAN / dt).round() as usize).clamp(2, (q.len() / 4).max(2));
@@ -126,7 +127,14 @@ pub fn velocity_fit(time: &[f64], q: &[f64], qd: &[f64]) -> Option<VelocityFit> 
         integral[k] = integral[k - 1] + 0.5 * (qd[k] + qd[k - 1]) * (time[k] - time[k - 1]);
     }
     let (mut xx, mut xy, mut yy, mut n) = (0.0, 0.0, 0.0, 0.0);
-    for k in span..q.len() {
+    let mut whole_from = 0;
+    for k in 1..q.len() {
+        if time[k] - time[k - 1] > GAP * dt {
+            whole_from = k;
+        }
+        if k < whole_from + span {
+            continue;
+        }
         let x = integral[k] - integral[k - span];
         let y = q[k] - q[k - span];
         xx += x * x;

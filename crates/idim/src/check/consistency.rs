@@ -7,106 +7,116 @@
 
 use super::faults::Fault;
 use super::moments::{Consistency, Moments};
+use super::prior;
+use super::proportions::Proportions;
 use super::readings::{Candidate, Reading, candidates, finer, plain_factors};
 use super::rows::{LONGEST, Motors, RowMaker, Samples, mixed};
-use idim_measurement::Place;
-use idim_measurement::doctor::{Finding, Severity};
+use super::suspicions::Suspicion;
 use idim_model::{JointStates, Robot};
 
 /// Fall of the joints' summed logarithmic errors from which another reading is believed, where the right one leaves no
-/// error; and what is asked for besides, per square of the mean error it leaves: on ill-fitting logs (elastic joints,
-/// small motions) readings differ by chance, by up to 0.75 at a mean error of 0.3.
+/// error and the log is long; and what is asked for besides, per square of the mean error it leaves: on ill-fitting logs
+/// (elastic joints, small motions) readings differ by chance, by up to 0.75 at a mean error of 0.3.
 const BELIEVED: [f64; 2] = [0.12, 10.0];
-/// A simpler reading is preferred to one better by less than this.
-const SIMPLER: f64 = 0.08;
+/// Share of that which is enough where a finding of another kind suspects the same.
+const BACKED: f64 = 0.25;
+/// Share of that which is asked for besides, per step of a fault's complexity.
+const SIMPLER: f64 = 0.4;
 /// Faults looked for one after another.
 const ROUNDS: usize = 4;
-/// Fall from which a delay is believed.
-const BELIEVED_DELAY: f64 = 0.25;
-/// Delay worth a warning, s; a drive's own filter takes a few milliseconds.
-const DELAY: f64 = 0.008;
+/// Independent samples of all joints a column needs before the rigid body alone is enough to refuse a log.
+const ENOUGH: f64 = 10.0;
+
+/// A fault, and why it is believed.
+#[derive(Debug, Clone)]
+pub(crate) struct Believed {
+    pub(crate) fault: Fault,
+    /// Fall of the misfit.
+    pub(crate) gain: f64,
+    /// Another finding suspected it.
+    pub(crate) backed: bool,
+}
 
 /// What was tried, and what came of it.
 #[derive(Debug, Clone)]
 pub(crate) struct Examination {
-    /// Faults accepted, each with the fall of the misfit.
-    pub(crate) faults: Vec<(Fault, f64)>,
-    /// Of the last reading.
+    /// Faults accepted, in the order they were found.
+    pub(crate) faults: Vec<Believed>,
+    /// The columns without them.
+    pub(crate) reading: Reading,
+    /// Of that reading.
     pub(crate) fit: Consistency,
     /// Held-out relative errors of a description that knows angles but no robot.
     pub(crate) plain: Vec<f64>,
     /// Delay of the torques behind the positions, s, and the fall of the misfit.
     pub(crate) delay: Option<(f64, f64)>,
+    /// How well torques follow those of the robot file's masses, if it states some.
+    pub(crate) follows: Option<f64>,
+    /// The arm moves too shortly to be sure of what its torques contradict.
+    pub(crate) short: bool,
 }
 
-/// Tries all readings of a log's columns.
-pub(crate) fn examine(samples: &[Samples], robot: &Robot) -> Examination {
+/// Tries all readings of a log's columns one fault away from `start`, then from what was found.
+pub(crate) fn examine(
+    samples: &[Samples],
+    robot: &Robot,
+    start: &Reading,
+    suspicions: &[Suspicion],
+) -> Examination {
     let motors = Motors::new(robot);
     let maker = RowMaker::new(robot);
-    let mut now = Reading::as_recorded(robot);
+    let mut now = start.clone();
     let look = Look {
         samples,
         maker: &maker,
         motors: &motors,
+        proportions: Proportions::new(samples, robot),
+        independent: samples.iter().map(|s| s.independent).sum(),
     };
     let mut moments = look.moments(&now, 0.0);
     let mut fit = look.fit(&moments, &now);
-    let mut faults = Vec::new();
-    for _ in 0..ROUNDS {
-        let mut tried: Vec<(Candidate, Consistency)> = Vec::new();
-        let mut shared: Option<(Reading, Moments)> = None;
-        let mut all = candidates(robot, &now);
-        all.extend(plain_factors(robot.n_joints(), &now));
-        for (fault, reading) in all {
-            let tried_fit = if reading.same_rows(&now) {
-                look.fit(&moments, &reading)
-            } else {
-                if shared.as_ref().is_none_or(|(r, _)| !r.same_rows(&reading)) {
-                    shared = Some((reading.clone(), look.moments(&reading, 0.0)));
-                }
-                let Some((_, other)) = &shared else { continue };
-                look.fit(other, &reading)
-            };
-            tried.push(((fault, reading), tried_fit));
-        }
-        let Some(((fault, reading), chosen)) = simplest(tried) else {
+    let mut faults: Vec<Believed> = Vec::new();
+    while faults.len() < ROUNDS {
+        let tried = look.one_fault_away(robot, &now, &moments);
+        let open = suspicions
+            .iter()
+            .filter(|s| !faults.iter().any(|b| s.covers(&b.fault)));
+        let open: Vec<&Suspicion> = open.collect();
+        let suspected = |t: &Tried| open.iter().any(|s| s.covers(&t.0.0));
+        let asked = |t: &Tried| {
+            let share = if suspected(t) { BACKED } else { 1.0 };
+            (share + SIMPLER * t.0.0.complexity()) * look.needed(&t.1)
+        };
+        let price = |t: &Tried| t.1.misfit + asked(t);
+        let best = tried
+            .iter()
+            .min_by(|a, b| price(a).total_cmp(&price(b)))
+            .filter(|t| price(t) < fit.misfit);
+        let Some(chosen) = best else {
             break;
         };
-        if fit.misfit - chosen.misfit < needed(&chosen) {
-            break;
-        }
+        let backed = suspected(chosen);
+        let ((fault, reading), chosen) = chosen.clone();
         let (fault, reading, misfit) = refined(&look, &moments, fault, reading, chosen.misfit);
-        faults.push((fault, fit.misfit - misfit));
+        faults.push(Believed {
+            fault,
+            gain: fit.misfit - misfit,
+            backed,
+        });
         now = reading;
         moments = look.moments(&now, 0.0);
         fit = look.fit(&moments, &now);
     }
     let delay = look.delay(&now, fit.misfit);
     Examination {
+        short: robot.n_joints() as f64 * look.independent < ENOUGH * maker.p as f64,
+        follows: prior::follows(samples, robot, &now),
         faults,
         plain: look.plain_errors(&now),
+        reading: now,
         fit,
         delay,
     }
-}
-
-/// Fall of the misfit from which a reading that leaves these errors is believed.
-fn needed(fit: &Consistency) -> f64 {
-    let mean = fit.relative.iter().sum::<f64>() / fit.relative.len() as f64;
-    BELIEVED[0] + BELIEVED[1] * mean * mean
-}
-
-/// The best reading of the simplest kind that is not much worse than the best of all.
-fn simplest(tried: Vec<(Candidate, Consistency)>) -> Option<(Candidate, Consistency)> {
-    let lowest = tried
-        .iter()
-        .map(|t| t.1.misfit)
-        .fold(f64::INFINITY, f64::min);
-    let near = tried.into_iter().filter(|t| t.1.misfit <= lowest + SIMPLER);
-    near.min_by(|a, b| {
-        let by_kind = a.0.0.complexity().cmp(&b.0.0.complexity());
-        by_kind.then(a.1.misfit.total_cmp(&b.1.misfit))
-    })
 }
 
 /// A factor without a name, to a tenth.
@@ -127,14 +137,48 @@ fn refined(
     })
 }
 
+/// A reading, and how it fits.
+type Tried = (Candidate, Consistency);
+
 /// The samples of all logs, and what is needed to read them.
 struct Look<'a> {
     samples: &'a [Samples],
     maker: &'a RowMaker,
     motors: &'a Motors,
+    proportions: Proportions,
+    /// Independent samples of a joint.
+    independent: f64,
 }
 
 impl Look<'_> {
+    /// Fall of the misfit from which a reading that leaves these errors is believed. `p` columns fitted to few samples miss
+    /// held-out ones by more, which a reading that silences them avoids: `p / 2` over the independent samples in all.
+    fn needed(&self, fit: &Consistency) -> f64 {
+        let mean = fit.mean_error();
+        let chance = 0.5 * self.maker.p as f64 / self.independent;
+        BELIEVED[0] + chance + BELIEVED[1] * mean * mean
+    }
+
+    /// Every reading one fault away from `now`, whose sums are `moments`, and how it fits.
+    fn one_fault_away(&self, robot: &Robot, now: &Reading, moments: &Moments) -> Vec<Tried> {
+        let mut other: Option<(Reading, Moments)> = None;
+        let mut all = candidates(robot, now);
+        all.extend(plain_factors(robot.n_joints(), now));
+        let fitted = |(fault, reading): Candidate| {
+            let fit = if reading.same_rows(now) {
+                self.fit(moments, &reading)
+            } else {
+                let kept = other.take().filter(|(r, _)| r.same_rows(&reading));
+                let kept = kept.unwrap_or_else(|| (reading.clone(), self.moments(&reading, 0.0)));
+                let fit = self.fit(&kept.1, &reading);
+                other = Some(kept);
+                fit
+            };
+            ((fault, reading), fit)
+        };
+        all.into_iter().map(fitted).collect()
+    }
+
     /// Sums of all logs with their positions read in a way and their torques taken `lag` seconds later.
     fn moments(&self, reading: &Reading, lag: f64) -> Moments {
         let turned = self.maker.with_gravity(reading.gravity);
@@ -147,19 +191,22 @@ impl Look<'_> {
             let torque = late.unwrap_or_else(|| samples.torque.clone());
             let torque = self.motors.columns(torque);
             let rows = self.motors.rows_of_columns(rows, maker.p);
-            Moments::new(&rows, maker.p, &torque, &samples.fold)
+            Moments::new(&rows, maker.p, &torque, &samples.fold).with_positive(&maker.positive())
         };
         let first = of(&self.samples[0]);
         let others = self.samples[1..].iter();
         others.fold(first, |all, samples| all.merged(&of(samples)))
     }
 
+    /// The misfit counts sizes out of proportion as it counts errors: by their logarithm.
     fn fit(&self, moments: &Moments, reading: &Reading) -> Consistency {
-        moments.fit(
-            &self
-                .motors
-                .change_of_torques(&reading.torque, &reading.torque_scale),
-        )
+        let motors = self.motors;
+        let share = motors.change_of_torques(&reading.torque, &reading.torque_scale);
+        let mut fit = moments.fit(&share);
+        fit.misfit += self.proportions.of_torques(&moments.deviations(&share));
+        let change = motors.change_of_positions(&reading.position, &reading.position_scale);
+        fit.misfit += self.proportions.of_positions(&change);
+        fit
     }
 
     /// The shift in time that makes torques and positions agree best, s, and the fall of the misfit.
@@ -245,84 +292,4 @@ fn plain_row(states: &JointStates, fastest: &[f64], j: usize, k: usize, long: bo
         [sum.sin(), sum.cos()]
     }));
     row
-}
-
-/// Error of one joint, in errors of the description without a robot, from which the robot is doubted. The right robot's
-/// last joint may reach 1.8: its torque is mostly friction.
-const WORSE: f64 = 2.1;
-/// Misfit by which a robot may be worse than that description where the description is good.
-const NO_BETTER: f64 = 0.3;
-/// Mean error below which the description without a robot is good enough to judge one.
-const GOOD: f64 = 0.2;
-/// Held-out relative error from which a joint is not explained.
-const UNEXPLAINED: f64 = 0.9;
-
-/// The joint whose torque the robot explains worst, and how many times worse than curves do, if that is too much.
-fn doubted(e: &Examination) -> Option<(usize, f64)> {
-    let times: Vec<f64> = e
-        .fit
-        .relative
-        .iter()
-        .zip(&e.plain)
-        .map(|(own, plain)| own / plain.max(1e-3))
-        .collect();
-    let worst = (0..times.len()).max_by(|&a, &b| times[a].total_cmp(&times[b]))?;
-    let mean = e.plain.iter().sum::<f64>() / e.plain.len() as f64;
-    let misfit: f64 = times.iter().map(|t| t.ln()).sum();
-    let wrong = times[worst] > WORSE || mean < GOOD && misfit > NO_BETTER;
-    wrong.then_some((worst, times[worst]))
-}
-
-/// The examination in findings.
-pub(crate) fn findings(e: &Examination, robot: &Robot, file: &str) -> Vec<Finding> {
-    let mut out = Vec::new();
-    if let Some(worst) = doubted(e) {
-        let (joint, times) = worst;
-        out.push(Finding {
-            code: "wrong-robot",
-            severity: Severity::Error,
-            place: Place::file(file),
-            value: Some(times),
-            met: format!(
-                "the robot explains the torque of {} {times:.1} times worse than curves that know no robot",
-                robot.joints()[joint].name
-            ),
-            rule: "the right robot's few parameters predict held-out samples better than any generic curve".into(),
-            next_step: "use the robot file of this log: its geometry, mounting, couplings and order of the joints".into(),
-        });
-    } else {
-        let faults = e.faults.iter();
-        out.extend(faults.flat_map(|(fault, gain)| fault.findings(robot, file, *gain)));
-        for (j, joint) in robot.joints().iter().enumerate() {
-            if e.fit.relative[j] > UNEXPLAINED {
-                out.push(Finding {
-                    code: "unexplained-torque",
-                    severity: Severity::Warning,
-                    place: Place::file(file).joint(&joint.name),
-                    value: Some(e.fit.relative[j]),
-                    met: format!(
-                        "a rigid body with friction leaves {:.0} % of this joint's torque unexplained on held-out samples",
-                        100.0 * e.fit.relative[j]
-                    ),
-                    rule: "most of a torque comes from gravity, inertia and friction".into(),
-                    next_step: "is it the torque of this joint, in this unit, of this motion?".into(),
-                });
-            }
-        }
-    }
-    if let Some((lag, gain)) = e.delay
-        && lag.abs() > DELAY
-        && gain > BELIEVED_DELAY
-    {
-        out.push(Finding {
-            code: "torque-delay",
-            severity: Severity::Warning,
-            place: Place::file(file),
-            value: Some(lag),
-            met: format!("torques lag positions by {:.1} ms", 1e3 * lag),
-            rule: "channels must be of one instant".into(),
-            next_step: "shift the torque columns by this time, or log both at one clock".into(),
-        });
-    }
-    out
 }

@@ -20,6 +20,8 @@ pub(crate) enum Fault {
     TorqueFactor {
         joint: Option<usize>,
         recorded: f64,
+        /// The factors of all joints are not of one sign.
+        turns: bool,
         code: &'static str,
         meaning: &'static str,
     },
@@ -33,10 +35,9 @@ pub(crate) enum Fault {
     Gravity(Vector3<f64>),
 }
 
+/// Complexity of a fault that is of the robot's description rather than of a column.
+pub(crate) const OF_THE_ROBOT: f64 = 3.0;
 /// Rule of everything the rigid body betrays.
-/// A reading that lowers the joints' summed logarithmic errors by less is a suspicion and stops nothing: parts of good
-/// logs of the TX40 do so by 0.34.
-const SPOILS: f64 = 0.5;
 const RULE: &str = "the joints share masses and inertias, so their torques must agree about them";
 
 impl Fault {
@@ -45,26 +46,81 @@ impl Fault {
         Self::TorqueFactor {
             joint: Some(joint),
             recorded: 1.0 / factor,
+            turns: false,
             code: "torque-scale",
             meaning: "no unit or gear ratio of the robot file: is it a current, in percent, or on the motor side?",
         }
     }
 
-    /// Simple faults go before contrived ones that explain a log as well.
-    pub(crate) fn complexity(&self) -> usize {
+    /// Simple faults go before contrived ones that explain a log as well. A column may have been left on the side of the
+    /// gears where the others are not; another unit in one column is rarer, and a factor without a name has one number
+    /// more to fit.
+    pub(crate) fn complexity(&self) -> f64 {
         match self {
             Self::TorqueSign(_)
             | Self::PositionSign(_)
             | Self::TorqueOrder(..)
-            | Self::PositionOrder(..) => 0,
-            Self::TorqueFactor { code, .. } if *code == "torque-scale" => 2,
-            Self::TorqueFactor { .. } | Self::PositionFactor { .. } => 1,
-            Self::Axis(_) | Self::Relabelled(..) | Self::Gravity(_) => 3,
+            | Self::PositionOrder(..) => 0.0,
+            Self::TorqueFactor { code, turns, .. } => match *code {
+                "torque-scale" => 2.0,
+                // Signs alone may be what explains the log.
+                _ if *turns => OF_THE_ROBOT,
+                "gear-side" => 1.0,
+                _ => 1.5,
+            },
+            Self::PositionFactor { .. } => 1.0,
+            Self::Axis(_) | Self::Relabelled(..) | Self::Gravity(_) => OF_THE_ROBOT,
         }
     }
 
-    /// As findings, one a joint concerned. `gain`: fall of the joints' summed logarithmic errors.
-    pub(crate) fn findings(&self, robot: &Robot, file: &str, gain: f64) -> Vec<Finding> {
+    /// In a few words, where faults are listed.
+    pub(crate) fn summary(&self, robot: &Robot) -> String {
+        let name = |j: usize| robot.joints()[j].name.as_str();
+        let whose = |joint: Option<usize>| joint.map_or("all joints", name);
+        match *self {
+            Self::TorqueSign(j) => format!("the torque of {} turned", name(j)),
+            Self::PositionSign(j) => format!("the position of {} turned", name(j)),
+            Self::Axis(j) => format!("the axis of {} turned", name(j)),
+            Self::TorqueOrder(i, k) => format!("torques of {} and {} exchanged", name(i), name(k)),
+            Self::PositionOrder(i, k) => {
+                format!("positions of {} and {} exchanged", name(i), name(k))
+            }
+            Self::Relabelled(i, k) => format!("columns of {} and {} exchanged", name(i), name(k)),
+            Self::TorqueFactor {
+                joint, recorded, ..
+            } => format!("the torque of {} divided by {recorded:.4e}", whose(joint)),
+            Self::PositionFactor {
+                joint, recorded, ..
+            } => format!("the position of {} divided by {recorded:.4e}", whose(joint)),
+            Self::Gravity(g) => {
+                format!("gravity along ({:.2}, {:.2}, {:.2}) m/s²", g.x, g.y, g.z)
+            }
+        }
+    }
+
+    /// Whether it concerns a joint.
+    pub(crate) fn concerns(&self, joint: usize) -> bool {
+        match *self {
+            Self::TorqueSign(j) | Self::PositionSign(j) | Self::Axis(j) => j == joint,
+            Self::TorqueOrder(i, k) | Self::PositionOrder(i, k) | Self::Relabelled(i, k) => {
+                joint == i || joint == k
+            }
+            Self::TorqueFactor { joint: j, .. } | Self::PositionFactor { joint: j, .. } => {
+                j.is_none_or(|j| j == joint)
+            }
+            Self::Gravity(_) => false,
+        }
+    }
+
+    /// As findings, one a joint concerned. `gain`: fall of the joints' summed logarithmic errors; `sure`: enough
+    /// to refuse the log.
+    pub(crate) fn findings(
+        &self,
+        robot: &Robot,
+        file: &str,
+        gain: f64,
+        sure: bool,
+    ) -> Vec<Finding> {
         let name = |j: usize| robot.joints()[j].name.as_str();
         let at = |j: usize| Place::file(file).joint(name(j));
         let better = format!(
@@ -73,7 +129,7 @@ impl Fault {
         );
         let finding = |code, place, value: f64, met: String, next: String| Finding {
             code,
-            severity: if gain > SPOILS {
+            severity: if sure {
                 Severity::Error
             } else {
                 Severity::Warning
@@ -145,6 +201,7 @@ impl Fault {
                 recorded,
                 code,
                 meaning,
+                ..
             } => vec![factor("the torque", joint, recorded, code, meaning)],
             Self::PositionFactor {
                 joint,

@@ -36,6 +36,10 @@ pub(crate) struct Moments {
     n: usize,
     p: usize,
     folds: Vec<Fold>,
+    /// Sums over all folds.
+    all: Fold,
+    /// Columns whose value cannot be negative: friction opposes motion.
+    positive: Vec<usize>,
 }
 
 /// How well a rigid body explains the torques as they are read.
@@ -45,6 +49,13 @@ pub(crate) struct Consistency {
     pub(crate) misfit: f64,
     /// Held-out error of each joint over the spread of its torque.
     pub(crate) relative: Vec<f64>,
+}
+
+impl Consistency {
+    /// Mean of the joints' relative errors.
+    pub(crate) fn mean_error(&self) -> f64 {
+        self.relative.iter().sum::<f64>() / self.relative.len() as f64
+    }
 }
 
 impl Moments {
@@ -97,7 +108,19 @@ impl Moments {
                 }
             }
         }
-        Self { n, p, folds }
+        Self {
+            n,
+            p,
+            all: total(&folds),
+            folds,
+            positive: Vec::new(),
+        }
+    }
+
+    /// The same sums, fitted with values of these columns that are not negative.
+    pub(crate) fn with_positive(mut self, columns: &[usize]) -> Self {
+        self.positive = columns.to_vec();
+        self
     }
 
     /// The sums of two logs of one robot.
@@ -105,7 +128,15 @@ impl Moments {
         for (a, b) in self.folds.iter_mut().zip(&other.folds) {
             a.add(b, 1.0);
         }
+        self.all = total(&self.folds);
         self
+    }
+
+    /// Standard deviation of each joint's torque about its mean.
+    pub(crate) fn deviations(&self, share: &[f64]) -> Vec<f64> {
+        let spread = (0..self.n).map(|j| self.spread(&self.all, share, j));
+        let count = self.all.count.max(1.0);
+        spread.map(|s| (s / count).sqrt()).collect()
     }
 
     /// Fits all joints together; the torque of joint `j` is `Σ_c share[j · n + c]` times channel `c`.
@@ -118,16 +149,16 @@ impl Moments {
     }
 
     fn fit_with(&self, share: &[f64], ridge: f64) -> Consistency {
-        let all = self.total();
-        let spread: Vec<f64> = (0..self.n).map(|j| self.spread(&all, share, j)).collect();
+        let all = &self.all;
+        let spread: Vec<f64> = (0..self.n).map(|j| self.spread(all, share, j)).collect();
         let mut weight: Vec<f64> = spread
             .iter()
             .map(|s| 1.0 / s.max(f64::MIN_POSITIVE))
             .collect();
         for _ in 0..ROUNDS {
-            let values = self.solve(&all, &weight, share, ridge);
+            let values = self.solve(all, &weight, share, ridge);
             for j in 0..self.n {
-                let error = self.error(&all, &values, share, j);
+                let error = self.error(all, &values, share, j);
                 let least = LEAST * LEAST * spread[j];
                 weight[j] = 1.0 / error.max(least).max(f64::MIN_POSITIVE);
             }
@@ -151,14 +182,6 @@ impl Moments {
         }
     }
 
-    fn total(&self) -> Fold {
-        let mut all = self.folds[0].clone();
-        for fold in &self.folds[1..] {
-            all.add(fold, 1.0);
-        }
-        all
-    }
-
     fn solve(&self, sums: &Fold, weight: &[f64], share: &[f64], ridge: f64) -> Vec<f64> {
         let (n, p) = (self.n, self.p);
         let (mut a, mut b) = (vec![0.0; p * p], vec![0.0; p]);
@@ -173,7 +196,17 @@ impl Moments {
         for k in 0..p {
             a[k * p + k] *= 1.0 + ridge;
         }
-        solve(&a, &b)
+        let mut used = vec![true; p];
+        loop {
+            let values = solve(&a, &b, &used);
+            // Each in the size of what it predicts.
+            let size = |&c: &usize| values[c] * a[c * p + c].sqrt();
+            let wrong = self.positive.iter().filter(|c| values[**c] < 0.0);
+            let Some(&worst) = wrong.min_by(|x, y| size(x).total_cmp(&size(y))) else {
+                return values;
+            };
+            used[worst] = false;
+        }
     }
 
     /// `Σ w τ` of joint `j` with its torque made of the channels.
@@ -250,13 +283,26 @@ impl Fold {
     }
 }
 
-/// Least squares from normal equations: equilibrated, pivoted Cholesky; columns that depend on others get zero.
-pub(crate) fn solve(a: &[f64], b: &[f64]) -> Vec<f64> {
+fn total(folds: &[Fold]) -> Fold {
+    let mut all = folds[0].clone();
+    for fold in &folds[1..] {
+        all.add(fold, 1.0);
+    }
+    all
+}
+
+/// Least squares from normal equations: equilibrated, pivoted Cholesky; columns that are not used or depend on others get
+/// zero.
+pub(crate) fn solve(a: &[f64], b: &[f64], used: &[bool]) -> Vec<f64> {
     let p = b.len();
     let d: Vec<f64> = (0..p)
         .map(|i| {
             let x = a[i * p + i];
-            if x > 0.0 { 1.0 / x.sqrt() } else { 0.0 }
+            if x > 0.0 && used[i] {
+                1.0 / x.sqrt()
+            } else {
+                0.0
+            }
         })
         .collect();
     let mut left: Vec<f64> = d.iter().map(|d| if *d > 0.0 { 1.0 } else { 0.0 }).collect();
@@ -315,7 +361,7 @@ mod tests {
                 }
             }
         }
-        let x = solve(&a, &b);
+        let x = solve(&a, &b, &[true; 3]);
         for t in [0.0, 1.7] {
             let y: f64 = columns(t).iter().zip(&x).map(|(w, x)| w * x).sum();
             assert!((y - (3.0 * t - 2.0)).abs() < 1e-7, "{y}");

@@ -1,22 +1,54 @@
 //! What the robot file states about torques: prior masses and limits.
 
-use super::rows::Samples;
-use idim_measurement::doctor::{Finding, Severity, examine_torque};
-use idim_measurement::{Measurements, Place};
+use super::readings::Reading;
+use super::rows::{Motors, Samples};
+use idim_measurement::doctor::{Finding, Severity, examine_torque, torque_fits};
+use idim_measurement::{Measurements, Place, Segment};
 use idim_model::{Model, Robot, inverse_dynamics_batch};
 
+/// Torques of the robot file's masses, and the stretch they are of; `None` where it states no masses. The columns are read
+/// as the rigid body reads them, so that its faults are not found twice.
+fn predicted(
+    samples: &Samples,
+    robot: &Robot,
+    reading: &Reading,
+) -> Option<(Segment, Vec<Vec<f64>>)> {
+    let parameters = robot.standard_parameters()?;
+    let segment = samples.longest_as(&Motors::new(robot), reading);
+    let turned = robot.clone().with_gravity(reading.gravity);
+    let model = Model::new(turned.as_ref().unwrap_or(robot));
+    let torque = inverse_dynamics_batch(&model, &parameters, &segment.states);
+    let of_joints = torque.chunks_exact(segment.states.n_samples());
+    let predicted = of_joints.map(<[f64]>::to_vec).collect();
+    Some((segment, predicted))
+}
+
 /// Findings of measured torques against those of the robot file's masses; none where it states none.
-pub(crate) fn prior_masses(samples: &Samples, robot: &Robot, file: &str) -> Vec<Finding> {
-    let Some(parameters) = robot.standard_parameters() else {
-        return Vec::new();
-    };
-    let segment = samples.longest();
-    let torque = inverse_dynamics_batch(&Model::new(robot), &parameters, &segment.states);
-    let predicted: Vec<Vec<f64>> = torque
-        .chunks_exact(segment.states.n_samples())
-        .map(<[f64]>::to_vec)
-        .collect();
-    examine_torque(segment, &predicted, robot, file)
+pub(crate) fn prior_masses(
+    samples: &Samples,
+    robot: &Robot,
+    reading: &Reading,
+    file: &str,
+) -> Vec<Finding> {
+    let predicted = predicted(samples, robot, reading);
+    predicted.map_or_else(Vec::new, |(segment, torque)| {
+        examine_torque(&segment, &torque, robot, file)
+    })
+}
+
+/// Share of a torque that masses must have before its correlation with theirs says something.
+const LOADED: f64 = 0.1;
+
+/// Best correlation of a joint's torque with that of the robot file's masses.
+pub(crate) fn follows(samples: &[Samples], robot: &Robot, reading: &Reading) -> Option<f64> {
+    let of_log = samples.iter().filter_map(|samples| {
+        let (segment, torque) = predicted(samples, robot, reading)?;
+        let fits = torque_fits(&segment, &torque);
+        let own = fits.iter().enumerate().map(|(j, of_joint)| of_joint[j]);
+        let loaded = own.filter(|fit| fit.weight > LOADED);
+        Some(loaded.map(|fit| fit.correlation).fold(0.0, f64::max))
+    });
+    of_log.reduce(f64::max)
 }
 
 /// Torque, in limits, that cannot be: peaks are short and limits have a reserve.
@@ -26,12 +58,17 @@ const BELOW: f64 = 0.02;
 /// Share of the samples that a torque must stay within to be called its size.
 const SIZE: f64 = 0.99;
 
-/// Findings of measured torques against the limits of the robot file.
-pub(crate) fn torque_limits(measured: &Measurements, robot: &Robot) -> Vec<Finding> {
+/// Findings of measured torques, read in a way, against the limits of the robot file.
+pub(crate) fn torque_limits(
+    measured: &Measurements,
+    robot: &Robot,
+    reading: &Reading,
+) -> Vec<Finding> {
+    let torques = Motors::new(robot).torques(measured.torque.clone(), reading);
     let used: Vec<Option<f64>> = robot
         .joints()
         .iter()
-        .zip(&measured.torque)
+        .zip(&torques)
         .map(|(joint, torque)| {
             let limit = joint.limits.torque.filter(|l| *l > 0.0)?;
             Some(size(torque) / limit)

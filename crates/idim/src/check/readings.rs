@@ -39,6 +39,12 @@ impl Reading {
             && self.gravity == other.gravity
     }
 
+    /// Whether the torques are read as they were recorded.
+    pub(crate) fn torque_as_recorded(&self) -> bool {
+        let in_order = self.torque.iter().enumerate().all(|(j, &c)| j == c);
+        in_order && self.torque_scale.iter().all(|&by| by == 1.0)
+    }
+
     fn torque_times(&self, joints: &[usize], factor: impl Fn(usize) -> f64) -> Self {
         let mut new = self.clone();
         for &j in joints {
@@ -99,6 +105,7 @@ pub(crate) fn candidates(robot: &Robot, now: &Reading) -> Vec<Candidate> {
             let fault = Fault::TorqueFactor {
                 joint: Some(j),
                 recorded: 1.0 / factor,
+                turns: false,
                 code,
                 meaning,
             };
@@ -147,10 +154,12 @@ pub(crate) fn candidates(robot: &Robot, now: &Reading) -> Vec<Candidate> {
 /// Faults of every joint at once, and of how the robot stands.
 fn whole_log(robot: &Robot, now: &Reading, gear: &[f64], all: &[usize], out: &mut Vec<Candidate>) {
     let geared = gear.iter().all(|g| g.is_finite()) && gear.iter().any(|g| g.abs() > 1.5);
+    let turns = gear.iter().any(|g| g * gear[0] < 0.0);
     if geared {
         let torque = |recorded, meaning| Fault::TorqueFactor {
             joint: None,
             recorded,
+            turns,
             code: "gear-side",
             meaning,
         };
@@ -192,6 +201,7 @@ fn whole_log(robot: &Robot, now: &Reading, gear: &[f64], all: &[usize], out: &mu
         let fault = Fault::TorqueFactor {
             joint: None,
             recorded: 1.0 / (gear[0] * constants[0]),
+            turns,
             code: "torque-is-current",
             meaning: "one over gear ratio and torque constant: all torques are currents",
         };

@@ -1,6 +1,7 @@
 //! Smooth samples of a log and the rows a robot has at them.
 
 use super::moments::FOLDS;
+use super::readings::Reading;
 use crate::structure::{KeepOrder, Structure};
 use idim_measurement::{ConditioningOptions, LowPass, Measurements, Segment, condition};
 use idim_model::{
@@ -30,6 +31,8 @@ pub(crate) struct Samples {
     at: Vec<(usize, usize)>,
     /// Fold of each.
     pub(crate) fold: Vec<usize>,
+    /// Independent samples in the time the arm moves: two a period of the low-pass.
+    pub(crate) independent: f64,
     /// States at the samples.
     pub(crate) states: JointStates,
     /// Torques at the samples, joint by joint.
@@ -42,10 +45,8 @@ impl Samples {
         let n = measured.n_joints();
         let steps = measured.time.len().max(2) - 1;
         let rate = steps as f64 / (measured.time[steps] - measured.time[0]);
-        let low_pass = Some(LowPass {
-            order: 2,
-            cutoff: CUTOFF.min(0.2 * rate),
-        });
+        let cutoff = CUTOFF.min(0.2 * rate);
+        let low_pass = Some(LowPass { order: 2, cutoff });
         let options = ConditioningOptions {
             low_pass,
             torque_low_pass: low_pass,
@@ -67,6 +68,8 @@ impl Samples {
                 }
             }
         }
+        let intervals = moving.iter().map(|&(s, _)| segments[s].interval);
+        let independent = 2.0 * cutoff * intervals.sum::<f64>();
         let stride = moving.len().div_ceil(SAMPLES).max(1);
         let at: Vec<(usize, usize)> = moving.into_iter().step_by(stride).collect();
         if at.len() < 10 * n.max(4) {
@@ -75,6 +78,7 @@ impl Samples {
         let fold = (0..at.len()).map(|k| (k * STRETCHES / at.len()) % FOLDS);
         let mut samples = Self {
             fold: fold.collect(),
+            independent,
             states: JointStates::zeros(n, at.len()),
             torque: Vec::new(),
             segments,
@@ -105,10 +109,21 @@ impl Samples {
             .collect()
     }
 
-    /// The longest stretch, whole.
-    pub(crate) fn longest(&self) -> &Segment {
+    /// The longest stretch, its columns read in a way.
+    pub(crate) fn longest_as(&self, motors: &Motors, reading: &Reading) -> Segment {
         let longest = (0..self.segments.len()).max_by_key(|&s| self.segments[s].time.len());
-        &self.segments[longest.unwrap_or(0)]
+        let mut segment = self.segments[longest.unwrap_or(0)].clone();
+        segment.states = motors.states(&segment.states, &reading.position, &reading.position_scale);
+        segment.torque = motors.torques(segment.torque, reading);
+        segment
+    }
+
+    /// Range of a joint's position, rad or m.
+    pub(crate) fn range(&self, joint: usize) -> f64 {
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        let q = self.states.q(joint).iter();
+        let (low, high) = q.fold(ends, |(a, b), &x| (a.min(x), b.max(x)));
+        high - low
     }
 
     /// Interval of the log, s.
@@ -123,26 +138,8 @@ impl Samples {
         from: &[usize],
         scale: &[f64],
     ) -> (JointStates, Vec<f64>) {
-        let mut states = self.states.clone();
-        let (n, count) = (states.n_joints(), states.n_samples());
-        let change = motors.change_of_positions(from, scale);
-        for j in 0..n {
-            for k in 0..count {
-                let (mut q, mut qd, mut qdd) = (motors.zero[j], 0.0, 0.0);
-                for i in 0..n {
-                    let by = change[j * n + i];
-                    if by != 0.0 {
-                        q += by * (self.states.q(i)[k] - motors.zero[i]);
-                        qd += by * self.states.qd(i)[k];
-                        qdd += by * self.states.qdd(i)[k];
-                    }
-                }
-                states.q_mut(j)[k] = q;
-                states.qd_mut(j)[k] = qd;
-                states.qdd_mut(j)[k] = qdd;
-            }
-        }
-        let fastest = (0..n).map(|j| {
+        let states = motors.states(&self.states, from, scale);
+        let fastest = (0..states.n_joints()).map(|j| {
             let speeds = states.qd(j).iter();
             speeds.fold(f64::MIN_POSITIVE, |m, v| m.max(v.abs()))
         });
@@ -157,6 +154,7 @@ impl Samples {
 pub(crate) struct Motors {
     /// Torques of the columns from torques of the joints, where motors turn with several joints; `[column · n + joint]`.
     columns_from_joints: Option<Vec<f64>>,
+    joints_from_columns: Vec<f64>,
     /// Gear ratios where positions and torques are recorded at the motors, else ones.
     position_gear: Vec<f64>,
     torque_gear: Vec<f64>,
@@ -182,9 +180,12 @@ impl Motors {
             turns[(c.motor, c.joint)] = c.ratio / own.unwrap_or(1.0);
         }
         let coupled = torques && !drives.couplings.is_empty();
-        let inverse = turns.transpose().try_inverse().filter(|_| coupled);
+        let forward = turns.transpose();
+        let inverse = forward.clone().try_inverse().filter(|_| coupled);
+        let by_rows = |m: DMatrix<f64>| (0..n * n).map(|k| m[(k / n, k % n)]).collect();
         Self {
-            columns_from_joints: inverse.map(|m| (0..n * n).map(|k| m[(k / n, k % n)]).collect()),
+            joints_from_columns: by_rows(forward),
+            columns_from_joints: inverse.map(by_rows),
             position_gear: gear(positions),
             torque_gear: gear(torques),
             zero: if positions {
@@ -196,7 +197,7 @@ impl Motors {
     }
 
     /// Joint positions from joint positions, when the motors' columns are read otherwise.
-    fn change_of_positions(&self, from: &[usize], scale: &[f64]) -> Vec<f64> {
+    pub(crate) fn change_of_positions(&self, from: &[usize], scale: &[f64]) -> Vec<f64> {
         let n = from.len();
         let mut reading = vec![0.0; n * n];
         for (j, (&i, &by)) in from.iter().zip(scale).enumerate() {
@@ -215,6 +216,43 @@ impl Motors {
             reading[j * n + i] = by * self.torque_gear[j] / self.torque_gear[i];
         }
         reading
+    }
+
+    /// States when the columns of the positions are read otherwise.
+    fn states(&self, recorded: &JointStates, from: &[usize], scale: &[f64]) -> JointStates {
+        let mut states = recorded.clone();
+        let (n, count) = (states.n_joints(), states.n_samples());
+        let change = self.change_of_positions(from, scale);
+        for j in 0..n {
+            for k in 0..count {
+                let (mut q, mut qd, mut qdd) = (self.zero[j], 0.0, 0.0);
+                for i in 0..n {
+                    let by = change[j * n + i];
+                    if by != 0.0 {
+                        q += by * (recorded.q(i)[k] - self.zero[i]);
+                        qd += by * recorded.qd(i)[k];
+                        qdd += by * recorded.qdd(i)[k];
+                    }
+                }
+                states.q_mut(j)[k] = q;
+                states.qd_mut(j)[k] = qd;
+                states.qdd_mut(j)[k] = qdd;
+            }
+        }
+        states
+    }
+
+    /// Torques of the joints when their columns are read otherwise.
+    pub(crate) fn torques(&self, recorded: Vec<Vec<f64>>, reading: &Reading) -> Vec<Vec<f64>> {
+        if reading.torque_as_recorded() {
+            return recorded;
+        }
+        let change = self.change_of_torques(&reading.torque, &reading.torque_scale);
+        let columns = mixed(&change, &self.columns(recorded));
+        match self.columns_from_joints {
+            Some(_) => mixed(&self.joints_from_columns, &columns),
+            None => columns,
+        }
     }
 
     /// Torques of the columns from torques of the joints.
@@ -266,6 +304,13 @@ pub(crate) fn mixed(share: &[f64], channels: &[Vec<f64>]) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// Shares of the friction next to standstill and of that at full speed in the friction at a speed: a straight line
+/// between both opposes every motion where both values do, even if friction falls with speed.
+fn ends(speed: f64, fastest: f64) -> [f64; 2] {
+    let share = speed / fastest;
+    [(share / TURNING).tanh() - share, share]
+}
+
 /// What a robot's rows are made of: base columns, and those of couplings and known torques.
 #[derive(Debug, Clone)]
 pub(crate) struct RowMaker {
@@ -301,6 +346,15 @@ impl RowMaker {
         })
     }
 
+    /// Columns whose values cannot be negative: frictions at standstill and at full speed.
+    pub(crate) fn positive(&self) -> Vec<usize> {
+        let kinds = [ParameterKind::Fc, ParameterKind::Fv];
+        let own = (0..self.columns.len()).filter(|&c| kinds.contains(&self.columns.0[c].kind));
+        let first = self.columns.len();
+        let motors = (0..self.coupled.len()).flat_map(|at| [1, 2].map(|k| first + 3 * at + k));
+        own.chain(motors).collect()
+    }
+
     /// Columns of a kind of parameter, one a joint where it is there.
     pub(crate) fn column_of(&self, kind: ParameterKind, joint: usize) -> Option<usize> {
         let here = |c: &idim_model::Parameter| c.kind == kind && c.index == joint;
@@ -312,18 +366,17 @@ impl RowMaker {
         let (n, p, own) = (self.robot.n_joints(), self.p, self.columns.len());
         let model = Model::new(&self.robot);
         let mut rows = vec![0.0; states.n_samples() * n * p];
-        let friction: Vec<Option<usize>> = (0..n)
-            .map(|j| self.column_of(ParameterKind::Fc, j))
+        let friction: Vec<[Option<usize>; 2]> = (0..n)
+            .map(|j| [ParameterKind::Fc, ParameterKind::Fv].map(|kind| self.column_of(kind, j)))
             .collect();
-        let turn = |v: f64, fastest: f64| (v / (TURNING * fastest)).tanh();
         visit_torque_regressor(&model, &self.columns, states, |block| {
             for lane in 0..block.n_samples() {
                 let k = block.first_sample() + lane;
                 for j in 0..n {
                     let row = &mut rows[(k * n + j) * p..][..own];
                     block.copy_row(j, lane, row);
-                    if let Some(c) = friction[j] {
-                        row[c] = turn(states.qd(j)[k], fastest[j]);
+                    if let [Some(c), Some(v)] = friction[j] {
+                        [row[c], row[v]] = ends(states.qd(j)[k], fastest[j]);
                     }
                 }
             }
@@ -341,8 +394,7 @@ impl RowMaker {
                     let row = &mut rows[(k * n + j) * p..][..p];
                     let c = own + 3 * at;
                     row[c] = share * qdd;
-                    row[c + 1] = share * qd;
-                    row[c + 2] = share * turn(qd, top);
+                    [row[c + 1], row[c + 2]] = ends(qd, top).map(|x| share * x);
                 }
             }
         }

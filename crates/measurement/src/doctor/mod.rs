@@ -26,6 +26,29 @@ use idim_model::Robot;
 /// If the log was read for another number of joints.
 #[track_caller]
 pub fn examine_log(log: &Log, robot: &Robot) -> Vec<Finding> {
+    let mut out = examine_channels(log, robot);
+    out.extend(examine_friction(log));
+    out.sort_by_key(|f| std::cmp::Reverse(f.severity));
+    out
+}
+
+/// What friction says of signs and order without a model: friction that drives or belongs to another joint.
+///
+/// Whether the torque's column or the position's is at fault, friction cannot tell.
+pub fn examine_friction(log: &Log) -> Vec<Finding> {
+    let mut out = Vec::new();
+    if let Some(samples) = torque::Samples::new(log) {
+        torque::friction(log, &samples, &mut out);
+    }
+    out
+}
+
+/// As [`examine_log`], all but friction.
+///
+/// # Panics
+/// If the log was read for another number of joints.
+#[track_caller]
+pub fn examine_channels(log: &Log, robot: &Robot) -> Vec<Finding> {
     assert_eq!(
         log.n_joints(),
         robot.n_joints(),
@@ -56,7 +79,6 @@ pub fn examine_log(log: &Log, robot: &Robot) -> Vec<Finding> {
         ));
     }
     if let Some(samples) = torque::Samples::new(log) {
-        torque::friction(log, &samples, &mut out);
         torque::delay(log, &samples, &mut out);
     }
     out.sort_by_key(|f| std::cmp::Reverse(f.severity));

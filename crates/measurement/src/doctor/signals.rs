@@ -218,11 +218,20 @@ const SMALLEST_JUMP: f64 = 0.05;
 /// Deviation of a torque from the mean of its neighbours, as a multiple of what 99 % of the samples show.
 const SPIKE: f64 = 30.0;
 
-/// Positions that jump (encoder reset, wrap) and torques that spike for one sample.
+/// Positions that jump (encoder reset, wrap) and torques that spike for one sample; gaps say nothing of either.
 pub(crate) fn jumps(log: &Log, out: &mut Vec<Finding>) {
+    let gaps = read_clock(&log.time).gaps;
+    let across = |first: usize, last: usize| {
+        gaps.iter()
+            .any(|gap| (first + 1..=last).contains(&gap.sample))
+    };
     for (j, joint) in log.joints.iter().enumerate() {
         let q = &log.q[j];
-        let steps: Vec<f64> = q.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+        let step = |(k, w): (usize, &[f64])| {
+            let step = (w[1] - w[0]).abs();
+            if across(k, k + 1) { 0.0 } else { step }
+        };
+        let steps: Vec<f64> = q.windows(2).enumerate().map(step).collect();
         let usual = (JUMP * quantile(&steps, 0.99)).max(SMALLEST_JUMP);
         if let Some(k) = steps.iter().position(|s| *s > usual) {
             let step = q[k + 1] - q[k];
@@ -245,10 +254,11 @@ pub(crate) fn jumps(log: &Log, out: &mut Vec<Finding>) {
             ));
         }
         let torque = &drive(log)[j];
-        let off: Vec<f64> = torque
-            .windows(3)
-            .map(|w| (w[1] - 0.5 * (w[0] + w[2])).abs())
-            .collect();
+        let deviation_of = |(k, w): (usize, &[f64])| {
+            let off = (w[1] - 0.5 * (w[0] + w[2])).abs();
+            if across(k, k + 2) { 0.0 } else { off }
+        };
+        let off: Vec<f64> = torque.windows(3).enumerate().map(deviation_of).collect();
         let usual = SPIKE * quantile(&off, 0.99).max(1e-3 * deviation(torque));
         let spikes = off.iter().filter(|v| **v > usual).count();
         if let Some(k) = off.iter().position(|v| *v > usual) {

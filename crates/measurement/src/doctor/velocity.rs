@@ -58,13 +58,16 @@ pub(crate) fn velocity(log: &Log, robot: &Robot, out: &mut Vec<Finding>) {
 
 /// A velocity that does not follow its joint, and the joint it follows instead, if any.
 fn unrelated(log: &Log, qd: &[Vec<f64>], joint: usize, place: Place, correlation: f64) -> Finding {
-    let other = (0..log.n_joints()).find(|&i| {
-        i != joint
-            && velocity_fit(&log.time, &log.q[i], &qd[joint])
-                .is_some_and(|f| f.correlation > SAME_MOTION)
+    let others = (0..log.n_joints()).filter(|&i| i != joint);
+    let followed = others.filter_map(|i| {
+        let fit = velocity_fit(&log.time, &log.q[i], &qd[joint])?;
+        Some((i, fit.correlation))
     });
+    let other = followed
+        .filter(|(_, correlation)| *correlation > SAME_MOTION)
+        .max_by(|a, b| a.1.total_cmp(&b.1));
     match other {
-        Some(other) => Finding::new(
+        Some((other, _)) => Finding::new(
             "joint-order",
             Severity::Error,
             place,
