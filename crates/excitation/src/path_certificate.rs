@@ -135,7 +135,8 @@ pub(crate) fn certify_torque(
                 if used > most[j].0 {
                     most[j] = (used, times[k]);
                 }
-                bound[j] = prior.used(j, value.abs() + half * rates[j]);
+                let known = prior.known_change(j, states.q(j)[k], half * magnitudes[j][1]);
+                bound[j] = prior.used(j, value.abs() + half * rates[j] + known);
                 open[k] |= bound[j] > share;
             }
             if !open[k] {

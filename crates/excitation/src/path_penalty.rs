@@ -155,6 +155,8 @@ impl<'a> PathPenalty<'a> {
                     let unknown = excess.iter().all(|e| *e == 0.0);
                     for (room, e) in self.room.iter_mut().zip(excess) {
                         let widened = unknown || e > 0.0;
+                        // Where a known torque has no value there is no excess to go by.
+                        let e = if e.is_finite() { e } else { 0.0 };
                         *room += if widened { ROOM + WIDENING * e } else { 0.0 };
                     }
                 }

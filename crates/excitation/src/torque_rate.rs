@@ -18,7 +18,8 @@ struct Body {
     first_moment: f64,
     /// Spectral norm of the inertia about the joint, kg·m².
     inertia: f64,
-    rotor: f64,
+    /// Magnitudes of what it feels of the rotors per acceleration of every joint, kg·m².
+    rotor: Vec<f64>,
     viscous: f64,
     offset: f64,
 }
@@ -57,7 +58,6 @@ impl TorqueRate {
             let ten = robot.links()[j].inertial;
             // A prior has them all.
             let ten = ten.map(|p| p.expressed_in(&joint.joint_from_link));
-            let [rotor, viscous] = prior.drive(j);
             Body {
                 parent: joint.parent,
                 kind: joint.kind,
@@ -68,8 +68,8 @@ impl TorqueRate {
                     let eigenvalues = p.inertia().symmetric_eigenvalues();
                     eigenvalues.iter().fold(0.0, |m: f64, e| m.max(e.abs()))
                 }),
-                rotor,
-                viscous,
+                rotor: prior.rotor_row(j).iter().map(|v| v.abs()).collect(),
+                viscous: prior.viscous(j),
                 offset: joint.offset.abs(),
             }
         };
@@ -79,7 +79,7 @@ impl TorqueRate {
         }
     }
 
-    /// Largest rate of each joint's torque, N·m/s, over a stretch with these magnitudes.
+    /// Largest rate of each joint's torque but for known torques, N·m/s, over a stretch with these magnitudes.
     pub(crate) fn bound(&self, magnitudes: &[Magnitudes]) -> Vec<f64> {
         let n = self.bodies.len();
         let base = Norms {
@@ -121,12 +121,14 @@ impl TorqueRate {
             let m = norms[k];
             let [arm, arm_rate] = arms[k];
             let w_below = body.parent.map_or(0.0, |p| norms[p].w);
-            let [_, _, qdd, qddd] = magnitudes[k];
+            let qdd = magnitudes[k][2];
             let rigid = match body.kind {
                 JointKind::Revolute => w_below * m.moment + m.moment_rate,
                 JointKind::Prismatic => w_below * m.force + m.force_rate,
             };
-            rates[k] = rigid + body.rotor * qddd + body.viscous * qdd;
+            let jerks = magnitudes.iter().map(|m| m[3]);
+            let rotors: f64 = body.rotor.iter().zip(jerks).map(|(i, j)| i * j).sum();
+            rates[k] = rigid + rotors + body.viscous * qdd;
             if let Some(p) = body.parent {
                 let below = &mut norms[p];
                 below.force += m.force;

@@ -169,3 +169,43 @@ fn regress_drives_that_cannot_be_are_refused() {
         assert!(message.contains(part), "{part:?} is not in {message:?}");
     }
 }
+
+#[test]
+fn identity_a_range_holds_every_value_between_and_closes_on_them() {
+    let table =
+        KnownTorque::from_table("t", 0, vec![[-1.0, 2.0], [0.0, -3.0], [0.5, 4.0]]).unwrap();
+    let formulas = [
+        "3*sin(2*q) - q^3/4 + 1",
+        "sqrt(1.3 - cos(q))*tanh(q) + abs(q - 0.2)",
+        "exp(-q^2)/(2 + sin(q)) + atan(q)",
+        "cos(q)^2 - 2^q + max(q, 0.1) - tan(q/4)",
+        "-q^2 + PI*cosh(q) - ln(3 + q)*floor(3*q)",
+    ];
+    let quantity = vec![("l".to_owned(), "sqrt(0.5 + q^2)".to_owned())];
+    let mut all = vec![table];
+    all.extend(formulas.map(|f| KnownTorque::from_formula("f", 0, &[], f).unwrap()));
+    all.push(KnownTorque::from_formula("g", 0, &quantity, "2*(l - 0.4)*q/l").unwrap());
+    for (which, torque) in all.iter().enumerate() {
+        for k in 0..200 {
+            let low = -1.5 + 0.015 * f64::from(k);
+            let high = low + 0.01 * f64::from(k % 20);
+            let [least, most] = torque.range(low, high);
+            for i in 0..=20 {
+                let value = torque.at(low + (high - low) * f64::from(i) / 20.0);
+                assert!(
+                    least <= value && value <= most,
+                    "{which}: {value} not in {least} .. {most}"
+                );
+            }
+            // No steeper than 40 anywhere here but for the floor's steps, each at most 2 high.
+            let steps = if which == 5 { 2.0 } else { 0.0 };
+            assert!(
+                most - least <= 40.0 * (high - low) + steps + 1e-12,
+                "{which}: {least} .. {most}"
+            );
+        }
+    }
+    let pole = KnownTorque::from_formula("p", 0, &[], "1/q").unwrap();
+    assert_eq!(pole.range(-0.1, 0.1), [f64::NEG_INFINITY, f64::INFINITY]);
+    assert!(pole.range(0.1, 0.2)[1] < 11.0);
+}

@@ -1,7 +1,9 @@
 //! Torques known by their shape over the joint's coordinate: springs and counterbalances.
 
 use super::formula::Formula;
+use super::interval::{Interval, IntervalOperators};
 use crate::error::Error;
+use exmex::{Express, FlatEx};
 
 /// The variable that stands for the joint's coordinate in a formula.
 const COORDINATE: &str = "q";
@@ -30,6 +32,10 @@ struct Step {
     text: String,
     /// Of `q` and the steps before.
     formula: Formula,
+    /// The same text on intervals.
+    enclosure: FlatEx<Interval, IntervalOperators>,
+    /// Where the variables of `enclosure` stand among `q` and the steps before.
+    inputs: Vec<usize>,
 }
 
 impl KnownTorque {
@@ -93,11 +99,20 @@ impl KnownTorque {
                 return Err(Error::robot(place, "a name given twice", rule));
             }
             let formula = Formula::parse(text, &known)
-                .map_err(|(met, rule)| Error::robot(place, met, rule))?;
+                .map_err(|(met, rule)| Error::robot(&place, met, rule))?;
+            let enclosure = FlatEx::parse(text).map_err(|e| {
+                let rule = "write it with + - * / ^, brackets, PI, sin, cos, sqrt and so on";
+                Error::robot(&place, format!("`{text}` is no formula: {e}"), rule)
+            })?;
+            // The formula has found every variable among them.
+            let place_of = |v: &String| known.iter().position(|k| k == v);
+            let inputs = enclosure.var_names().iter().filter_map(place_of).collect();
             steps.push(Step {
                 name: quantity.clone(),
                 text: text.clone(),
                 formula,
+                enclosure,
+                inputs,
             });
         }
         Ok(Self {
@@ -146,6 +161,41 @@ impl KnownTorque {
                     values.push(step.formula.at(&values));
                 }
                 values.last().copied().unwrap_or(f64::NAN)
+            }
+        }
+    }
+
+    /// Least and greatest torque anywhere from `low` to `high` (rad, m), N·m (N) for a scale of 1.
+    ///
+    /// Exact for a table. A formula is evaluated on intervals, which bound it from outside, the closer the nearer `low` and
+    /// `high` are; infinite where that proves nothing, as beside a pole.
+    ///
+    /// `range(low, high)[0] ≤ at(q) ≤ range(low, high)[1]` for every `q` between.
+    ///
+    /// # Panics
+    /// If `low` is above `high`.
+    #[track_caller]
+    pub fn range(&self, low: f64, high: f64) -> [f64; 2] {
+        assert!(low <= high, "a range from {low} to {high}");
+        match &self.curve {
+            Curve::Table(points) => {
+                let inside = points.iter().filter(|p| p[0] > low && p[0] < high);
+                let ends = [self.at(low), self.at(high)];
+                inside.fold([ends[0].min(ends[1]), ends[0].max(ends[1])], |[a, b], p| {
+                    [a.min(p[1]), b.max(p[1])]
+                })
+            }
+            Curve::Formula { steps } => {
+                let mut values = vec![Interval::new(low, high)];
+                for step in steps {
+                    let arguments: Vec<Interval> = step.inputs.iter().map(|&k| values[k]).collect();
+                    let Ok(value) = step.enclosure.eval(&arguments) else {
+                        return [f64::NEG_INFINITY, f64::INFINITY];
+                    };
+                    values.push(value);
+                }
+                let torque = values[values.len() - 1];
+                [torque.low, torque.high]
             }
         }
     }
