@@ -114,7 +114,7 @@ const TX40_OPTIONS: [&str; 6] = ["--cutoff", "100", "--rate", "50", "--dead-band
 fn regress_tx40_from_its_motors_matches_the_published_parameters() {
     let Some(tx40) = Tx40::new() else { return };
     // One variance a joint, as published: the published values share this estimator's noise. Those of the full covariance
-    // differ by what two estimates of one truth may: Fc5 by 2.4 standard deviations of the difference, the most of 61.
+    // differ by what two estimates of one truth may: Fc5 by 2.4 standard deviations of the difference.
     let options: Vec<&str> = TX40_OPTIONS
         .into_iter()
         .chain(["--weighting", "diagonal"])
