@@ -10,7 +10,7 @@ use crate::load::LoadedRobot;
 use crate::plan::{SamplingOptions, SamplingPlan};
 use crate::report_html::{LogSummary, Spectrum, summaries};
 use crate::result::{ErrorResult, IdentificationResult, JointError, SCHEMA};
-use crate::samples::{Stretch, all_stretches, decimator, predict};
+use crate::samples::{Stretch, all_stretches, decimator, predict, stated_stretches};
 use crate::sampling_choice::{Sampling, choose_sampling};
 use crate::standstill::standstill_warnings;
 use crate::structure::Structure;
@@ -110,8 +110,12 @@ pub fn identify(
     let plan = with_own_dead_band(robot, plan, &at_first, options);
     drop(at_first);
     let Sampling { plan, cutoff } = choose_sampling(robot, &training, plan, options)?;
-    let mut train = all_stretches(&training, &plan)?;
-    let mut held_out = all_stretches(&validation, &plan)?;
+    let (mut train, clocks) = stated_stretches(&training, &plan)?;
+    let (mut held_out, held_out_clocks) = stated_stretches(&validation, &plan)?;
+    let mut conditioning = clocks;
+    // Two parts of one log are said to be so once.
+    conditioning.extend(held_out_clocks);
+    conditioning.dedup();
     for part in [&train, &held_out] {
         warnings.extend(standstill_warnings(robot, part, options));
     }
@@ -156,7 +160,7 @@ pub fn identify(
         paper: Vec::new(),
         inferred: Vec::new(),
         findings: Vec::new(),
-        conditioning: plan.choices.clone(),
+        conditioning: plan.choices.iter().cloned().chain(conditioning).collect(),
         cutoff,
         warnings,
     };

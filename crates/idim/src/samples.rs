@@ -3,7 +3,7 @@
 use crate::columns::{ModelColumns, reversal_of, smooth_sign};
 use crate::error::Error;
 use crate::plan::{PASS_BAND, Parallel, SamplingPlan};
-use idim_measurement::{ConditioningOptions, Decimator, LowPass, Measurements, condition};
+use idim_measurement::{Choice, ConditioningOptions, Decimator, LowPass, Measurements, condition};
 use idim_model::{
     Columns, JointStates, Model, Parameter, ParameterKind, Robot, visit_torque_regressor,
 };
@@ -48,14 +48,23 @@ pub(crate) fn stretches(
     measured: &Measurements,
     plan: &SamplingPlan,
 ) -> Result<Vec<Stretch>, Error> {
+    Ok(conditioned(measured, plan)?.0)
+}
+
+/// The stretches of a log, and the choices that were made for it.
+fn conditioned(
+    measured: &Measurements,
+    plan: &SamplingPlan,
+) -> Result<(Vec<Stretch>, Vec<Choice>), Error> {
     let Some(cutoff) = plan.cutoff else {
-        return Ok(vec![Stretch {
+        let whole = Stretch {
             file: measured.file.clone(),
             time: measured.time.clone(),
             states: measured.states_as_recorded()?,
             torque: measured.torque.clone(),
             load: None,
-        }]);
+        };
+        return Ok((vec![whole], Vec::new()));
     };
     let options = ConditioningOptions {
         low_pass: Some(LowPass {
@@ -67,17 +76,14 @@ pub(crate) fn stretches(
         ..ConditioningOptions::default()
     };
     let conditioned = condition(measured, &options)?;
-    Ok(conditioned
-        .segments
-        .into_iter()
-        .map(|s| Stretch {
-            file: measured.file.clone(),
-            time: s.time,
-            states: s.states,
-            torque: s.torque,
-            load: None,
-        })
-        .collect())
+    let stretches = conditioned.segments.into_iter().map(|s| Stretch {
+        file: measured.file.clone(),
+        time: s.time,
+        states: s.states,
+        torque: s.torque,
+        load: None,
+    });
+    Ok((stretches.collect(), conditioned.choices))
 }
 
 /// The stretches of several logs.
@@ -88,9 +94,44 @@ pub(crate) fn all_stretches(
     logs: &[Measurements],
     plan: &SamplingPlan,
 ) -> Result<Vec<Stretch>, Error> {
-    let parts: Result<Vec<_>, _> = logs.iter().map(|m| stretches(m, plan)).collect();
-    Ok(parts?.into_iter().flatten().collect())
+    Ok(stated_stretches(logs, plan)?.0)
 }
+
+/// The stretches of several logs, and a sentence a log on what its own clock made of it: gaps, grid, edges.
+///
+/// # Errors
+/// As [`stretches`].
+pub(crate) fn stated_stretches(
+    logs: &[Measurements],
+    plan: &SamplingPlan,
+) -> Result<(Vec<Stretch>, Vec<String>), Error> {
+    let (mut all, mut said) = (Vec::new(), Vec::new());
+    for log in logs {
+        let (stretches, choices) = conditioned(log, plan)?;
+        all.extend(stretches);
+        let own: Vec<String> = choices
+            .iter()
+            .filter(|c| OF_THE_CLOCK.contains(&c.what))
+            .map(|c| {
+                let value = (c.value * 1e4).round() / 1e4;
+                let space = if c.unit.is_empty() { "" } else { " " };
+                format!("{} {value}{space}{} ({})", c.what, c.unit, c.why)
+            })
+            .collect();
+        if !own.is_empty() {
+            said.push(format!("{}: {}", log.file, own.join("; ")));
+        }
+    }
+    Ok((all, said))
+}
+
+/// Choices that differ from log to log; the plan states the others.
+const OF_THE_CLOCK: [&str; 4] = [
+    "gaps",
+    "resampled, clock jitter",
+    "samples in segments too short to filter",
+    "left out at both ends",
+];
 
 /// Rows of W and y, sample by sample: row `sample · n_joints + joint`, row-major.
 #[derive(Debug, Clone, Default)]
