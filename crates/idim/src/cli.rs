@@ -11,7 +11,7 @@ use crate::identify::{IdentifyOptions, identify};
 use crate::load::{Changes, LoadedRobot, load_robot};
 use crate::log_spec::LogSpec;
 use crate::logs::{read_logs, read_mapping};
-use crate::output::write_atomically;
+use crate::output::{remove_earlier, write_atomically};
 use crate::plan::SamplingOptions;
 use crate::progress::Progress;
 use crate::report::{identification_text, paper_text, reduction_text, warnings_text};
@@ -344,6 +344,8 @@ fn write_results(
     for (name, text) in files {
         write_atomically(&folder.join(name), text.as_bytes())?;
     }
+    let written: Vec<&str> = files.iter().map(|f| f.0.as_str()).collect();
+    remove_earlier(&folder, &written)?;
     write_atomically(&folder.join("report.html"), page.as_bytes())?;
     write_atomically(&folder.join("result.json"), json.as_bytes())?;
     say(
