@@ -327,7 +327,9 @@ pub type NamedText = (String, String);
 
 /// What was typed, under the program's own name.
 fn command_line() -> String {
-    shell_line(std::iter::once("idim".to_owned()).chain(std::env::args().skip(1)))
+    let typed = std::env::args_os().skip(1);
+    let typed = typed.map(|a| a.to_string_lossy().into_owned());
+    shell_line(std::iter::once("idim".to_owned()).chain(typed))
 }
 
 /// Writes `DIR/ROBOT/result.json`, the report and what else there is, and says where.
