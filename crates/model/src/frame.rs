@@ -45,6 +45,8 @@ pub(crate) enum Rotation {
 pub(crate) struct Fixed {
     pub(crate) rotation: Rotation,
     pub(crate) translation: [f64; 3],
+    /// Which components of the translation are other than zero.
+    pub(crate) reaches: [bool; 3],
 }
 
 impl Rotation {
@@ -103,6 +105,7 @@ impl Fixed {
         Self {
             rotation,
             translation: pose.translation.into(),
+            reaches: [0, 1, 2].map(|k| pose.translation[k] != 0.0),
         }
     }
 
@@ -144,19 +147,25 @@ fn rows_times<T: Lane>(r: &[[f64; 3]; 3], v: V3<T>) -> V3<T> {
 /// `w × p + v` with a constant `p`: zero components cost nothing.
 #[inline(always)]
 pub(crate) fn shift<T: Lane>(p: [f64; 3], v: V3<T>, w: V3<T>) -> V3<T> {
+    shift_where([p[0] != 0.0, p[1] != 0.0, p[2] != 0.0], p, v, w)
+}
+
+/// The same where it is known already which components are zero.
+#[inline(always)]
+pub(crate) fn shift_where<T: Lane>(reaches: [bool; 3], p: [f64; 3], v: V3<T>, w: V3<T>) -> V3<T> {
     let mut out = v;
     let [px, py, pz] = p;
-    if px != 0.0 {
+    if reaches[0] {
         let p = w[0].like(px);
         out[1] = w[2].mul_add(p, out[1]);
         out[2] = (-w[1]).mul_add(p, out[2]);
     }
-    if py != 0.0 {
+    if reaches[1] {
         let p = w[0].like(py);
         out[0] = (-w[2]).mul_add(p, out[0]);
         out[2] = w[0].mul_add(p, out[2]);
     }
-    if pz != 0.0 {
+    if reaches[2] {
         let p = w[0].like(pz);
         out[0] = w[1].mul_add(p, out[0]);
         out[1] = (-w[0]).mul_add(p, out[1]);

@@ -10,6 +10,7 @@ use crate::kinematics::{LinkMotion, Screw, Travel, zero_motion, zero_screw};
 use crate::lane::{Kernel, Lane, read, zero};
 use crate::model::Model;
 use crate::newton_euler::{link_wrench, splat_ten};
+use crate::packing::Rows;
 use crate::parameter::{Columns, ParameterKind};
 use crate::plan::Plan;
 use crate::projection::Kinematics;
@@ -102,25 +103,25 @@ pub fn regressor_contraction_gradient(
     mut weigh: impl FnMut(&RegressorBlock, &mut RegressorBlock),
 ) -> JointStates {
     let n = model.n_joints();
-    let plan = Plan::new(model, columns);
-    let mut y = RegressorBlock::new(n, columns.len());
-    let mut g = y.clone();
+    let rows = Rows::new(model, columns);
+    let mut y = RegressorBlock::packed(&rows);
+    let mut g = RegressorBlock::dense(n, columns.len());
     let mut kinematics = Kinematics::new(model, [F64x8::ZERO, F64x8::ONE]);
     over_lanes(model, states, |first, lanes, work| {
         y.move_to(first, states.n_samples());
         g.move_to(first, states.n_samples());
-        let fill = Fill {
+        let fill = Fill::<_, true> {
             model,
-            plan: &plan,
+            rows: rows.all(),
             state: lanes.state(),
             kinematics: &mut kinematics,
-            rows: y.entries_mut(),
+            cells: y.entries_mut(),
         };
         fill.over_eight();
         weigh(&y, &mut g);
         let contraction = RegressorContraction {
             model,
-            plan: &plan,
+            plan: &rows.plan,
             state: lanes.state(),
             kinematics: &kinematics,
             weights: g.entries(),
@@ -313,12 +314,15 @@ struct TorqueContraction<'a, C> {
 impl<C> Kernel<C> for TorqueContraction<'_, C> {
     #[inline(always)]
     fn run<T: Lane<Cell = C>>(&mut self, at: T::At) {
-        self.work.outward::<T>(at, self.model, self.state);
-        for (t, term) in self.terms.iter().enumerate() {
-            self.wrenches::<T>(at, term);
-            self.twists::<T>(at, t, term);
+        for part in 0..T::PARTS {
+            let at = T::part(at, part);
+            self.work.outward::<T>(at, self.model, self.state);
+            for (t, term) in self.terms.iter().enumerate() {
+                self.wrenches::<T>(at, term);
+                self.twists::<T>(at, t, term);
+            }
+            self.work.inward::<T>(at, self.model, self.state[1]);
         }
-        self.work.inward::<T>(at, self.model, self.state[1]);
     }
 }
 
@@ -378,7 +382,7 @@ impl<C> TorqueContraction<'_, C> {
     }
 }
 
-/// `kinematics` as `fill` left it; `weights` as it lays out the rows.
+/// `kinematics` as `fill` left it; `weights`: rows of all columns.
 struct RegressorContraction<'a, C> {
     model: &'a Model,
     plan: &'a Plan,
@@ -399,21 +403,15 @@ impl RegressorContraction<'_, F64x8> {
 impl<C: Copy> Kernel<C> for RegressorContraction<'_, C> {
     #[inline(always)]
     fn run<T: Lane<Cell = C>>(&mut self, at: T::At) {
-        self.work.outward::<T>(at, self.model, self.state);
-        for j in 0..self.model.n_joints() {
-            self.link::<T>(at, j);
-            for &(kind, column) in &self.plan.drives[j] {
-                let weight = T::read(at, &self.weights[j * self.plan.n_columns + column]);
-                let mut out = JointBar::<T>::read(at, &self.work.out[j]);
-                match kind {
-                    ParameterKind::Ia => out.qdd = out.qdd + weight,
-                    ParameterKind::Fv => out.qd = out.qd + weight,
-                    _ => {}
-                }
-                out.write(at, &mut self.work.out[j]);
+        for part in 0..T::PARTS {
+            let at = T::part(at, part);
+            self.work.outward::<T>(at, self.model, self.state);
+            for j in 0..self.model.n_joints() {
+                self.link::<T>(at, j);
+                self.drives::<T>(at, j);
             }
+            self.work.inward::<T>(at, self.model, self.state[1]);
         }
-        self.work.inward::<T>(at, self.model, self.state[1]);
     }
 }
 
@@ -432,7 +430,7 @@ impl<C: Copy> RegressorContraction<'_, C> {
                 rotation,
                 translation,
                 ..
-            } => WrenchMap::new(&own_motion).motion_at(rotation, *translation),
+            } => WrenchMap::new(&own_motion).motion_at(&own_motion, rotation, *translation),
         };
         let mut bar = LinkMotion::zero(at);
         let mut below = Screw::zero(at);
@@ -466,6 +464,20 @@ impl<C: Copy> RegressorContraction<'_, C> {
             bar = frame_bar(&own_motion, bar, rotation, *translation);
         }
         self.work.add_bar(at, j, &bar);
+    }
+
+    #[inline(always)]
+    fn drives<T: Lane<Cell = C>>(&mut self, at: T::At, j: usize) {
+        for &(kind, column) in &self.plan.drives[j] {
+            let weight = T::read(at, &self.weights[j * self.plan.n_columns + column]);
+            let mut out = JointBar::<T>::read(at, &self.work.out[j]);
+            match kind {
+                ParameterKind::Ia => out.qdd = out.qdd + weight,
+                ParameterKind::Fv => out.qd = out.qd + weight,
+                _ => {}
+            }
+            out.write(at, &mut self.work.out[j]);
+        }
     }
 
     /// The weights of row `i` in the columns of link `j`, as ten parameters.

@@ -1,6 +1,6 @@
 //! Gradients against derivatives of the regressor by dual numbers.
 
-use crate::plan::Plan;
+use crate::packing::Rows;
 use crate::projection::{Kinematics, fill};
 use crate::testing::{Dual, dual, robot_and_state};
 use crate::*;
@@ -19,7 +19,7 @@ fn numbers(count: usize, seed: u64) -> Vec<f64> {
 /// `∂Y/∂x` for each of the `3 n` numbers of a state, by dual numbers; `n × p` row by row.
 fn regressor_derivatives(model: &Model, columns: &Columns, s: &JointState) -> Vec<Vec<Dual>> {
     let n = model.n_joints();
-    let plan = Plan::new(model, columns);
+    let rows = Rows::new(model, columns);
     (0..3 * n)
         .map(|x| {
             let seeded = |part: usize, v: &[f64]| -> Vec<Dual> {
@@ -28,11 +28,11 @@ fn regressor_derivatives(model: &Model, columns: &Columns, s: &JointState) -> Ve
                     .collect()
             };
             let (q, qd, qdd) = (seeded(0, &s.q), seeded(1, &s.qd), seeded(2, &s.qdd));
-            let mut rows = vec![dual(0.0, 0.0); n * columns.len()];
+            let mut cells = vec![dual(0.0, 0.0); rows.n_cells];
             let mut kinematics = Kinematics::new(model, [dual(0.0, 0.0), dual(1.0, 0.0)]);
             let state = [&q[..], &qd, &qdd];
-            fill::<Dual>((), model, &plan, state, &mut kinematics, &mut rows);
-            rows
+            fill::<Dual, true>((), model, rows.all(), state, &mut kinematics, &mut cells);
+            rows.places.iter().map(|&place| cells[place]).collect()
         })
         .collect()
 }

@@ -245,21 +245,21 @@ proptest! {
         let columns = Columns::standard(n, DriveColumns::ALL);
         let mut states = crate::states::LaneStates::new(n);
         states.load(&JointStates::from_states(std::slice::from_ref(&state)), 0);
-        let plan = crate::plan::Plan::new(&model, &columns);
+        let target = crate::packing::Rows::new(&model, &columns);
         let one = torque_regressor(&model, &columns, &state);
         for arch in crate::testing::architectures() {
-            let mut rows = vec![crate::wide::F64x8::ZERO; n * columns.len()];
+            let mut rows = vec![crate::wide::F64x8::ZERO; target.n_cells];
             let ends = [crate::wide::F64x8::ZERO, crate::wide::F64x8::ONE];
-            let mut fill = crate::regressor::Fill {
+            let mut fill = crate::regressor::Fill::<_, true> {
                 model: &model,
-                plan: &plan,
+                rows: target.all(),
                 state: states.state(),
                 kinematics: &mut crate::projection::Kinematics::new(&model, ends),
-                rows: &mut rows,
+                cells: &mut rows,
             };
             crate::wide::over_eight_on(arch, &mut fill);
-            for (k, cell) in rows.iter().enumerate() {
-                for x in cell.0 {
+            for (k, &place) in target.places.iter().enumerate() {
+                for x in rows[place].0 {
                     prop_assert_eq!(x, one[(k / columns.len(), k % columns.len())]);
                 }
             }

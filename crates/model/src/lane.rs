@@ -13,6 +13,10 @@ pub(crate) trait Lane:
     type At: Copy;
     /// A number of every sample in memory.
     type Cell: Copy + 'static;
+    /// Registers a cell takes.
+    const PARTS: usize;
+    /// Another of a cell's registers.
+    fn part(at: Self::At, part: usize) -> Self::At;
     /// The same value in every sample.
     fn splat(at: Self::At, x: f64) -> Self;
     /// The same value in every sample, beside an existing lane.
@@ -33,13 +37,17 @@ pub(crate) trait Lane:
 
 /// An operation written once for every lane whose cells are `C`; it is compiled for several instruction sets.
 pub(crate) trait Kernel<C> {
-    /// The operation; inlined always, so that it is compiled with the caller's instructions.
+    /// The operation on all samples of the cells, one register (`T::part`) after another; inlined always, so that it is
+    /// compiled with the caller's instructions.
     fn run<T: Lane<Cell = C>>(&mut self, at: T::At);
 }
 
 impl Lane for f64 {
     type At = ();
     type Cell = Self;
+    const PARTS: usize = 1;
+    #[inline(always)]
+    fn part((): (), _: usize) {}
     #[inline(always)]
     fn splat((): (), x: f64) -> Self {
         x

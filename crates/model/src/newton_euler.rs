@@ -106,6 +106,15 @@ struct Recursion<'a, C> {
 impl<C> Kernel<C> for Recursion<'_, C> {
     #[inline(always)]
     fn run<T: Lane<Cell = C>>(&mut self, at: T::At) {
+        for part in 0..T::PARTS {
+            self.run_part::<T>(T::part(at, part));
+        }
+    }
+}
+
+impl<C> Recursion<'_, C> {
+    #[inline(always)]
+    fn run_part<T: Lane<Cell = C>>(&mut self, at: T::At) {
         let ([q, qd, qdd], work) = (self.state, &mut *self.work);
         let base = LinkMotion::<T>::base(at, self.model);
         for (j, joint) in self.model.joints.iter().enumerate() {

@@ -1,46 +1,79 @@
 //! Rows without what is always zero: where each entry stands in them.
 
-use crate::lane::Lane;
 use crate::model::Model;
 use crate::parameter::{Columns, ParameterKind};
-use crate::plan::{ASK, Layout, LinkPlan, Plan};
+use crate::plan::{ASK, Plan};
 
-/// Cells of what can be other than zero, side by side and without signs, as a [`Packing`] has them.
+/// Where the entries that can be other than zero are written to.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Packed<'a> {
+pub(crate) struct Target<'a> {
+    pub(crate) plan: &'a Plan,
     /// At `link * n + k`: first cell of the link in the row of the `k`-th joint on its path.
-    pub(crate) rows: &'a [usize],
+    pub(crate) links: &'a [usize],
     /// First drive cell of each joint.
     pub(crate) drives: &'a [usize],
 }
 
-impl<C> Layout<C> for Packed<'_> {
-    #[inline(always)]
-    fn row(self, link: usize, k: usize, _: usize) -> usize {
-        self.rows[link * self.drives.len() + k]
+/// Cells beyond the last entry: a link's ten must fit wherever it begins. They stay zero.
+pub(crate) const ROOM: usize = 10;
+
+/// Rows of a sample, one after another, each with only what can be other than zero.
+#[derive(Debug, Clone)]
+pub(crate) struct Rows {
+    pub(crate) plan: Plan,
+    links: Vec<usize>,
+    drives: Vec<usize>,
+    /// At `joint * n_columns + column`: the cell of that entry; one that stays zero where it is zero.
+    pub(crate) places: Vec<usize>,
+    pub(crate) n_cells: usize,
+}
+
+impl Rows {
+    #[track_caller]
+    pub(crate) fn new(model: &Model, columns: &Columns) -> Self {
+        let n = model.n_joints();
+        let plan = Plan::new(model, columns);
+        let packing = Packing::new(model, columns, &plan);
+        let mut first = Vec::with_capacity(n);
+        let mut end = 0;
+        for keys in &packing.keys {
+            first.push(end);
+            // The observation is not part of these rows.
+            end += keys.len() - 1;
+        }
+        let mut places = vec![end; n * columns.len()];
+        for (joint, keys) in packing.keys.iter().enumerate() {
+            for (column, (key, _)) in packing.columns.iter().enumerate() {
+                if let Ok(place) = keys.binary_search(key) {
+                    places[joint * columns.len() + column] = first[joint] + place;
+                }
+            }
+        }
+        Self {
+            links: packing
+                .start
+                .iter()
+                .map(|&(joint, start)| first[joint] + start)
+                .collect(),
+            drives: first
+                .iter()
+                .zip(&packing.drives)
+                .map(|(a, b)| a + b)
+                .collect(),
+            plan,
+            places,
+            n_cells: end + ROOM,
+        }
     }
 
-    #[inline(always)]
-    fn length<const WANTED: u16>(self, link: &LinkPlan) -> usize {
-        let wanted = if WANTED == ASK { link.wanted } else { WANTED };
-        wanted.count_ones() as usize
-    }
-
-    #[inline(always)]
-    fn put<T: Lane<Cell = C>, const WANTED: u16>(
-        self,
-        at: T::At,
-        link: &LinkPlan,
-        k: usize,
-        cells: &mut [C],
-        value: T,
-    ) {
-        value.write(at, &mut cells[link.rank::<WANTED>(k)]);
-    }
-
-    #[inline(always)]
-    fn drive(self, joint: usize, d: usize, _: usize) -> usize {
-        self.drives[joint] + d
+    /// All of them.
+    #[inline]
+    pub(crate) fn all(&self) -> Target<'_> {
+        Target {
+            plan: &self.plan,
+            links: &self.links,
+            drives: &self.drives,
+        }
     }
 }
 

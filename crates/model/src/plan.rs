@@ -23,7 +23,6 @@ pub(crate) struct Twin {
     pub(crate) entry: usize,
     pub(crate) negated: bool,
     pub(crate) column: usize,
-    pub(crate) first: usize,
 }
 
 /// Columns of a link, by the place of the entry among the ten.
@@ -33,7 +32,7 @@ pub(crate) struct LinkPlan {
     pub(crate) wanted: u16,
     column: [usize; 10],
     /// -0 where the column is the entry's negative, else 0: to flip its sign by.
-    sign: [f64; 10],
+    pub(crate) sign: [f64; 10],
 }
 
 /// All ten entries of a link.
@@ -65,7 +64,7 @@ impl LinkPlan {
         self.wanted.count_ones() as usize
     }
 
-    /// Place of entry `k` among those asked for.
+    /// Place of entry `k`, one of the ten, among those asked for.
     #[inline(always)]
     pub(crate) fn rank<const WANTED: u16>(&self, k: usize) -> usize {
         let wanted = if WANTED == ASK { self.wanted } else { WANTED };
@@ -79,65 +78,6 @@ impl LinkPlan {
             return T::splat(at, 0.0);
         }
         T::read(at, &row[self.column[k]]).flipped(self.sign[k])
-    }
-}
-
-/// Where the entries of the regressor are written to.
-pub(crate) trait Layout<C>: Copy {
-    /// First cell of a link's entries in the row of `joint`, the `k`-th on its path.
-    fn row(self, link: usize, k: usize, joint: usize) -> usize;
-
-    /// Cells from there on that the link's entries lie in.
-    fn length<const WANTED: u16>(self, link: &LinkPlan) -> usize;
-
-    /// Writes entry `k`, which is asked for, to its place among them.
-    fn put<T: Lane<Cell = C>, const WANTED: u16>(
-        self,
-        at: T::At,
-        link: &LinkPlan,
-        k: usize,
-        cells: &mut [C],
-        value: T,
-    );
-
-    /// The cell of a joint's drive entry, the `d`-th of its own.
-    fn drive(self, joint: usize, d: usize, column: usize) -> usize;
-}
-
-/// Rows of all columns, one after another, each column at its place and with its sign.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Full {
-    pub(crate) n_columns: usize,
-}
-
-impl<C> Layout<C> for Full {
-    #[inline(always)]
-    fn row(self, _: usize, _: usize, joint: usize) -> usize {
-        joint * self.n_columns
-    }
-
-    #[inline(always)]
-    fn length<const WANTED: u16>(self, _: &LinkPlan) -> usize {
-        self.n_columns
-    }
-
-    #[inline(always)]
-    fn put<T: Lane<Cell = C>, const WANTED: u16>(
-        self,
-        at: T::At,
-        link: &LinkPlan,
-        k: usize,
-        cells: &mut [C],
-        value: T,
-    ) {
-        // Without a branch: there is one of these for every entry of the regressor.
-        let value = value.flipped(link.sign[k]);
-        value.write(at, &mut cells[link.column[k]]);
-    }
-
-    #[inline(always)]
-    fn drive(self, joint: usize, _: usize, column: usize) -> usize {
-        joint * self.n_columns + column
     }
 }
 
@@ -168,7 +108,6 @@ impl Plan {
                     entry,
                     negated: sign < 0.0,
                     column,
-                    first: link.column[entry],
                 });
                 continue;
             }

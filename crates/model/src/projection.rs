@@ -3,16 +3,19 @@
 //! Entry (joint i, link j) is the axis of joint i, seen from link j (six numbers), times the 6 × 10 map of that link's
 //! parameters to its wrench. Only axes travel along the chain. Parallel axes share their direction, and with it the six
 //! entries of the inertia tensor; the link's own axis is z, and the one before it most often has no part along z.
+//!
+//! Decisions are taken once for all registers of a cell, by link and by direction; what is between two decisions goes from
+//! memory to memory.
 
-use crate::frame::{LinkPose, Rotation, shift};
+use crate::frame::{LinkPose, Rotation, shift_where};
 use crate::kinematics::{LinkMotion, Screw, Travel, zero_motion};
 use crate::lane::{Lane, V3, minus, read, splat, times, write, zero};
 use crate::model::{Direction, KernelJoint, Model};
+use crate::packing::{ROOM, Target};
 use crate::parameter::ParameterKind;
-use crate::plan::{ALL, ASK, BASE_XX, BASE_YY, Full, Layout, LinkPlan, Plan};
+use crate::plan::{ALL, ASK, BASE_XX, BASE_YY, LinkPlan};
 use crate::robot::JointKind;
-use crate::wrench_map::{ABOUT_Z, ACROSS, ANY, WrenchMap};
-use std::ops::Range;
+use crate::wrench_map::{ABOUT_Z, ACROSS, ANY, SLIDE, WrenchMap};
 
 /// Motions and axes of one sample or eight.
 #[derive(Debug, Clone)]
@@ -20,8 +23,12 @@ pub(crate) struct Kinematics<C> {
     n: usize,
     /// Sine and cosine, or travel, of every joint.
     travel: Vec<[C; 2]>,
-    /// Motion of every link; before its turn has come, of the link below at this joint's origin.
+    /// Motion of every link; its acceleration only where the link's frame stands apart from its joint's.
     motion: Vec<LinkMotion<C>>,
+    /// Acceleration of every joint's origin, in the axes of the link below.
+    origin: Vec<V3<C>>,
+    /// The map of the link whose turn it is.
+    map: WrenchMap<C>,
     /// At `link * n + d`: direction `d` of the link's path; the last one is z and stays.
     direction: Vec<V3<C>>,
     /// At `link * n + k`: speed of the link's origin per unit speed of the `k`-th joint on its path, if it turns; zero for
@@ -37,6 +44,8 @@ impl<C: Copy> Kinematics<C> {
             n,
             travel: vec![[zero; 2]; n],
             motion: vec![zero_motion(zero); n],
+            origin: vec![[zero; 3]; n],
+            map: WrenchMap::cells(zero),
             direction: vec![[zero, zero, one]; n * n],
             linear: vec![[zero; 3]; n * n],
         }
@@ -68,41 +77,48 @@ impl<C: Copy> Kinematics<C> {
     #[inline(always)]
     fn turn_joints<T: Lane<Cell = C>>(&mut self, at: T::At, model: &Model, q: &[C]) {
         for ((joint, q), travel) in model.joints.iter().zip(q).zip(&mut self.travel) {
-            Travel::new(joint, T::read(at, q)).write(at, travel);
+            for part in 0..T::PARTS {
+                let at = T::part(at, part);
+                Travel::new(joint, T::read(at, q)).write(at, travel);
+            }
         }
     }
 
-    /// Takes link `j` from the link below: its motion and the axes on its path.
+    /// Takes link `j` from the link below: its motion, its map and the axes on its path.
     #[inline(always)]
     fn go_out<T: Lane<Cell = C>>(
         &mut self,
         at: T::At,
         model: &Model,
         j: usize,
-        [qd, qdd]: [T; 2],
-    ) -> WrenchMap<T> {
+        [qd, qdd]: [&C; 2],
+    ) {
         // The same lines for every step, compiled once for each simple one.
         let joint = &model.joints[j];
-        let travel = Travel::read(at, joint.kind, &self.travel[j]);
-        match (joint.step.rotation, travel) {
-            (Rotation::Quarter, Travel::Turn { s, c }) => {
-                let step = (Rotation::Quarter, Travel::Turn { s, c });
-                self.carry_axes(at, model, j, step);
-                self.move_link(at, model, j, step, [qd, qdd])
-            }
-            (Rotation::None, Travel::Turn { s, c }) => {
-                let step = (Rotation::None, Travel::Turn { s, c });
-                self.carry_axes(at, model, j, step);
-                self.move_link(at, model, j, step, [qd, qdd])
-            }
-            step => {
-                self.carry_axes(at, model, j, step);
-                self.move_link(at, model, j, step, [qd, qdd])
+        for part in 0..T::PARTS {
+            let at = T::part(at, part);
+            let speeds = [T::read(at, qd), T::read(at, qdd)];
+            let travel = Travel::read(at, joint.kind, &self.travel[j]);
+            match (joint.step.rotation, travel) {
+                (Rotation::Quarter, Travel::Turn { s, c }) => {
+                    let step = (Rotation::Quarter, Travel::Turn { s, c });
+                    self.carry_axes(at, model, j, step);
+                    self.move_link(at, model, j, step, speeds);
+                }
+                (Rotation::None, Travel::Turn { s, c }) => {
+                    let step = (Rotation::None, Travel::Turn { s, c });
+                    self.carry_axes(at, model, j, step);
+                    self.move_link(at, model, j, step, speeds);
+                }
+                step => {
+                    self.carry_axes(at, model, j, step);
+                    self.move_link(at, model, j, step, speeds);
+                }
             }
         }
     }
 
-    /// Motion of link `j` about its joint's frame, and what it does at the joints the link carries.
+    /// Motion of link `j` about its joint's frame, from that of the link below.
     #[inline(always)]
     fn move_link<T: Lane<Cell = C>>(
         &mut self,
@@ -110,49 +126,74 @@ impl<C: Copy> Kinematics<C> {
         model: &Model,
         j: usize,
         step: (Rotation, Travel<T>),
-        [qd, qdd]: [T; 2],
-    ) -> WrenchMap<T> {
+        speeds: [T; 2],
+    ) {
         let joint = &model.joints[j];
-        let below = LinkMotion::<T>::read(at, &self.motion[j]);
-        let carried = match joint.parent {
+        let below = joint.parent.map(|p| (p, &model.joints[p]));
+        // Each arm goes through to the end: where they met, all of a motion would have to be put down.
+        match below {
             None => {
                 let up = joint.step.rotation.inward(minus(model.gravity));
-                let vertical = up[0] == 0.0 && up[1] == 0.0;
                 let a = splat(at, up);
-                LinkMotion {
+                let vertical = up[0] == 0.0 && up[1] == 0.0;
+                let carried = LinkMotion {
                     w: zero(at),
                     wd: zero(at),
                     a: if vertical { a } else { step.1.inward(a) },
-                }
+                };
+                let motion = carried.moved(step.1, speeds[0], speeds[1]);
+                self.put_map(at, model, j, &motion, WrenchMap::planar(&motion));
             }
-            Some(p) if model.joints[p].planar => {
+            Some((p, KernelJoint { planar: true, .. })) => {
                 let z = z_beyond(at, step);
-                LinkMotion {
-                    w: times(below.w[2], z),
-                    wd: times(below.wd[2], z),
-                    a: into_joint(step, below.a),
+                let below = &self.motion[p];
+                let carried = LinkMotion {
+                    w: times(T::read(at, &below.w[2]), z),
+                    wd: times(T::read(at, &below.wd[2]), z),
+                    a: into_joint(step, read(at, &self.origin[j])),
+                };
+                let motion = carried.moved(step.1, speeds[0], speeds[1]);
+                if joint.planar {
+                    self.put_map(at, model, j, &motion, WrenchMap::planar(&motion));
+                } else {
+                    self.put_map(at, model, j, &motion, WrenchMap::new(&motion));
                 }
             }
-            Some(_) => LinkMotion {
-                w: into_joint(step, below.w),
-                wd: into_joint(step, below.wd),
-                a: into_joint(step, below.a),
-            },
-        };
-        let motion = carried.moved(step.1, qd, qdd);
-        let map = if joint.planar {
-            WrenchMap::planar(&motion)
-        } else {
-            WrenchMap::new(&motion)
-        };
-        for &c in &joint.children {
-            let at_child = LinkMotion {
-                a: map.acceleration_at(model.joints[c].step.translation),
-                ..motion
-            };
-            at_child.write(at, &mut self.motion[c]);
+            Some((p, _)) => {
+                let below = &self.motion[p];
+                let carried = LinkMotion {
+                    w: into_joint(step, read(at, &below.w)),
+                    wd: into_joint(step, read(at, &below.wd)),
+                    a: into_joint(step, read(at, &self.origin[j])),
+                };
+                let motion = carried.moved(step.1, speeds[0], speeds[1]);
+                self.put_map(at, model, j, &motion, WrenchMap::new(&motion));
+            }
         }
-        map
+    }
+
+    /// Puts down what is known of link `j`, and what it does at the joints it carries.
+    #[inline(always)]
+    fn put_map<T: Lane<Cell = C>>(
+        &mut self,
+        at: T::At,
+        model: &Model,
+        j: usize,
+        motion: &LinkMotion<T>,
+        map: WrenchMap<T>,
+    ) {
+        map.write(at, &mut self.map);
+        let known = &mut self.motion[j];
+        write(at, motion.w, &mut known.w);
+        write(at, motion.wd, &mut known.wd);
+        if let LinkPose::Posed { .. } = model.joints[j].link {
+            write(at, motion.a, &mut known.a);
+        }
+        for &c in &model.joints[j].children {
+            let step = &model.joints[c].step;
+            let a = map.acceleration_at(step.translation);
+            write(at, a, &mut self.origin[c]);
+        }
     }
 
     /// Carries the axes of the link below out to link `j`.
@@ -166,42 +207,42 @@ impl<C: Copy> Kinematics<C> {
     ) {
         let joint = &model.joints[j];
         let Some(p) = joint.parent else { return };
-        let n = self.n;
-        let p_from = joint.step.translation;
-        let below = &model.joints[p].directions;
-        let (inner, outer) = self.direction.split_at_mut(j * n);
-        let (inner_linear, outer_linear) = self.linear.split_at_mut(j * n);
-        let (directions, linears) = (&inner[p * n..][..n], &inner_linear[p * n..][..n]);
-        let (out, out_linear) = (&mut outer[..n], &mut outer_linear[..n]);
-        for d in below {
-            let own_of_below = d.index + 1 == below.len();
-            let stays = d.index + 1 == joint.directions.len();
-            let outside = read(at, &directions[d.index]);
-            let direction = match (stays, own_of_below) {
-                (true, _) => z_axis(at),
-                (false, true) => z_beyond(at, step),
-                (false, false) => into_joint(step, outside),
-            };
-            if !stays {
-                write(at, direction, &mut out[d.index]);
-            }
+        let Some((own, others)) = model.joints[p].directions.split_last() else {
+            return;
+        };
+        let (from, to) = (p * self.n, j * self.n);
+        let (reaches, reach) = (joint.step.reaches, joint.step.translation);
+        for d in others {
+            let outside = read(at, &self.direction[from + d.index]);
+            let direction = into_joint(step, outside);
+            write(at, direction, &mut self.direction[to + d.index]);
             if d.kind == JointKind::Prismatic {
                 continue;
             }
-            for k in d.range.clone() {
-                let inside = read(at, &linears[k]);
-                let shifted = if own_of_below {
-                    shift_about_z(p_from, inside)
-                } else {
-                    shift(p_from, inside, outside)
-                };
-                let mut linear = into_joint(step, shifted);
-                if let Travel::Slide { d } = step.1 {
-                    linear[0] = direction[1].mul_add(d, linear[0]);
-                    linear[1] = (-direction[0]).mul_add(d, linear[1]);
-                }
-                write(at, linear, &mut out_linear[k]);
+            for k in d.range.start..d.range.end {
+                let inside = read(at, &self.linear[from + k]);
+                let shifted = shift_where(reaches, reach, inside, outside);
+                let linear = carried_speed(step, direction, shifted);
+                write(at, linear, &mut self.linear[to + k]);
             }
+        }
+        // The axis of the joint below itself is z there, and stays z where the two are parallel.
+        let stays = joint.directions.len() == others.len() + 1;
+        let direction = if stays {
+            z_axis(at)
+        } else {
+            z_beyond(at, step)
+        };
+        if !stays {
+            write(at, direction, &mut self.direction[to + own.index]);
+        }
+        if own.kind == JointKind::Prismatic {
+            return;
+        }
+        for k in own.range.start..own.range.end {
+            let shifted = shift_about_z(reach, read(at, &self.linear[from + k]));
+            let linear = carried_speed(step, direction, shifted);
+            write(at, linear, &mut self.linear[to + k]);
         }
     }
 }
@@ -210,6 +251,17 @@ impl<C: Copy> Kinematics<C> {
 #[inline(always)]
 fn into_joint<T: Lane>((rotation, travel): (Rotation, Travel<T>), v: V3<T>) -> V3<T> {
     travel.inward(rotation.inward(v))
+}
+
+/// A speed at the joint's frame, still in the axes of the link below, at the link's own frame in its axes.
+#[inline(always)]
+fn carried_speed<T: Lane>(step: (Rotation, Travel<T>), direction: V3<T>, v: V3<T>) -> V3<T> {
+    let mut linear = into_joint(step, v);
+    if let Travel::Slide { d } = step.1 {
+        linear[0] = direction[1].mul_add(d, linear[0]);
+        linear[1] = (-direction[0]).mul_add(d, linear[1]);
+    }
+    linear
 }
 
 #[inline(always)]
@@ -232,246 +284,310 @@ fn shift_about_z<T: Lane>(p: [f64; 3], v: V3<T>) -> V3<T> {
     [v[0] - v[0].like(p[1]), v[1] + v[1].like(p[0]), v[2]]
 }
 
-/// Writes the entries that can be other than zero; `rows` is `n × p`, joint by joint, zero where nothing was written yet.
+/// Writes the entries that can be other than zero, with their columns' signs or without.
 #[inline(always)]
-pub(crate) fn fill<T: Lane>(
+pub(crate) fn fill<T: Lane, const SIGNED: bool>(
     at: T::At,
     model: &Model,
-    plan: &Plan,
-    state: [&[T::Cell]; 3],
-    kinematics: &mut Kinematics<T::Cell>,
-    rows: &mut [T::Cell],
-) {
-    let p = plan.n_columns;
-    fill_as::<T, _>(
-        at,
-        model,
-        (plan, Full { n_columns: p }),
-        state,
-        kinematics,
-        rows,
-    );
-    for twin in &plan.twins {
-        for &i in &model.joints[twin.link].path {
-            let entry = T::read(at, &rows[i * p + twin.first]);
-            entry.write(at, &mut rows[i * p + twin.column]);
-        }
-    }
-}
-
-/// The same in a layout, without columns that are asked for more than once.
-#[inline(always)]
-pub(crate) fn fill_as<T: Lane, L: Layout<T::Cell>>(
-    at: T::At,
-    model: &Model,
-    (plan, layout): (&Plan, L),
+    target: Target<'_>,
     [q, qd, qdd]: [&[T::Cell]; 3],
     kinematics: &mut Kinematics<T::Cell>,
     cells: &mut [T::Cell],
 ) {
+    let n = kinematics.n;
     kinematics.turn_joints::<T>(at, model, q);
     for (j, joint) in model.joints.iter().enumerate() {
-        let (qd, qdd) = (T::read(at, &qd[j]), T::read(at, &qdd[j]));
-        let map = kinematics.go_out(at, model, j, [qd, qdd]);
-        let link = &plan.links[j];
+        kinematics.go_out::<T>(at, model, j, [&qd[j], &qdd[j]]);
+        let link = &target.plan.links[j];
         if !link.is_empty() {
-            let to = Target {
-                at,
+            let rows = &target.links[j * n..][..joint.path.len()];
+            let of = OfLink {
                 j,
+                joint,
                 link,
-                layout,
+                rows,
             };
-            to.project(joint, &map, kinematics, cells);
+            of.project::<T, SIGNED>(at, kinematics, cells);
         }
-        for (d, &(kind, column)) in plan.drives[j].iter().enumerate() {
-            let entry = match kind {
-                ParameterKind::Ia => qdd,
-                ParameterKind::Fv => qd,
-                ParameterKind::Fc => qd.sign(),
-                _ => T::splat(at, 1.0),
-            };
-            entry.write(at, &mut cells[layout.drive(j, d, column)]);
+        for (d, &(kind, _)) in target.plan.drives[j].iter().enumerate() {
+            let cell = &mut cells[target.drives[j] + d];
+            for part in 0..T::PARTS {
+                let at = T::part(at, part);
+                let entry = match kind {
+                    ParameterKind::Ia => T::read(at, &qdd[j]),
+                    ParameterKind::Fv => T::read(at, &qd[j]),
+                    ParameterKind::Fc => T::read(at, &qd[j]).sign(),
+                    _ => T::splat(at, 1.0),
+                };
+                entry.write(at, cell);
+            }
         }
     }
 }
 
-/// The cells of a link's entries.
-struct Target<'a, T: Lane, L> {
-    at: T::At,
+/// The entries of a link.
+struct OfLink<'a> {
     j: usize,
+    joint: &'a KernelJoint,
     link: &'a LinkPlan,
-    layout: L,
+    /// Its first cell in the row of every joint on its path.
+    rows: &'a [usize],
 }
 
-impl<T: Lane, L: Layout<T::Cell>> Target<'_, T, L> {
-    /// The rows' entries for the link's columns.
+impl OfLink<'_> {
+    /// The rows' entries for the link's columns, compiled once for each set of them that is frequent.
     #[inline(always)]
-    fn project(
+    fn project<T: Lane, const SIGNED: bool>(
         &self,
-        joint: &KernelJoint,
-        map: &WrenchMap<T>,
-        kinematics: &Kinematics<T::Cell>,
+        at: T::At,
+        kinematics: &mut Kinematics<T::Cell>,
         cells: &mut [T::Cell],
     ) {
-        match (&joint.link, self.link.wanted) {
-            (
-                LinkPose::Posed {
-                    rotation,
-                    translation,
-                    ..
-                },
-                _,
-            ) => self.project_posed(joint, map, (rotation, *translation), kinematics, cells),
-            (_, BASE_XX) => self.project_along::<BASE_XX>(joint, map, kinematics, cells),
-            (_, BASE_YY) => self.project_along::<BASE_YY>(joint, map, kinematics, cells),
-            (_, ALL) => self.project_along::<ALL>(joint, map, kinematics, cells),
-            _ => self.project_along::<ASK>(joint, map, kinematics, cells),
+        if let LinkPose::Posed {
+            rotation,
+            translation,
+            ..
+        } = &self.joint.link
+        {
+            return self.project_posed::<T>(at, (rotation, *translation), kinematics, cells);
+        }
+        match self.link.wanted {
+            BASE_XX => self.project_along::<T, BASE_XX, SIGNED>(at, kinematics, cells),
+            BASE_YY => self.project_along::<T, BASE_YY, SIGNED>(at, kinematics, cells),
+            ALL => self.project_along::<T, ALL, SIGNED>(at, kinematics, cells),
+            _ => self.project_along::<T, ASK, SIGNED>(at, kinematics, cells),
         }
     }
 
     /// Rows of a link whose axes are along those of its joint's frame.
     #[inline(always)]
-    fn project_along<const WANTED: u16>(
+    fn project_along<T: Lane, const WANTED: u16, const SIGNED: bool>(
         &self,
-        joint: &KernelJoint,
-        map: &WrenchMap<T>,
+        at: T::At,
         kinematics: &Kinematics<T::Cell>,
         cells: &mut [T::Cell],
     ) {
-        let (at, n) = (self.at, kinematics.n);
-        let linear = &kinematics.linear[self.j * n..][..joint.path.len()];
-        let direction = &kinematics.direction[self.j * n..][..n];
-        for d in &joint.directions {
-            let v = read(at, &direction[d.index]);
-            let Range { start, end } = d.range;
-            let own = d.index + 1 == joint.directions.len();
-            match (d.kind, own, d.across) {
-                (JointKind::Prismatic, _, _) => {
-                    let row = self.row::<WANTED>(joint, start, cells);
-                    for k in 6..10 {
-                        if self.link.wants::<WANTED>(k) {
-                            self.put::<WANTED>(k, row, map.force_entry(k, v));
-                        }
-                    }
+        let first = self.j * kinematics.n;
+        let linear = &kinematics.linear[first..][..self.rows.len()];
+        let direction = &kinematics.direction[first..][..kinematics.n];
+        let map = &kinematics.map;
+        let Some((own, others)) = self.joint.directions.split_last() else {
+            return;
+        };
+        for (d, v) in others.iter().zip(direction) {
+            let (rows, f) = (&self.rows[d.range.clone()], &linear[d.range.clone()]);
+            match (d.kind, d.across) {
+                (JointKind::Prismatic, _) => {
+                    self.project_slide::<T, WANTED, SIGNED>(at, rows, v, map, cells);
                 }
-                (_, true, _) => {
-                    let below = start..end - 1;
-                    self.project_direction::<ABOUT_Z, WANTED>(
-                        joint,
-                        below,
-                        (v, linear),
-                        map,
-                        cells,
-                    );
-                    let row = self.row::<WANTED>(joint, end - 1, cells);
-                    for k in 0..8 {
-                        if self.link.wants::<WANTED>(k) {
-                            let entry = if k < 6 {
-                                map.tensor_entry::<ABOUT_Z>(k, v)
-                            } else {
-                                map.own_moment_entry(k)
-                            };
-                            self.put::<WANTED>(k, row, entry);
-                        }
-                    }
-                }
-                (_, _, true) => {
-                    self.project_direction::<ACROSS, WANTED>(
-                        joint,
-                        start..end,
-                        (v, linear),
+                (_, true) => {
+                    self.project_direction::<T, ACROSS, WANTED, SIGNED>(
+                        at,
+                        rows,
+                        (v, f),
                         map,
                         cells,
                     );
                 }
-                _ => self.project_direction::<ANY, WANTED>(
-                    joint,
-                    start..end,
-                    (v, linear),
-                    map,
-                    cells,
-                ),
+                _ => self.project_direction::<T, ANY, WANTED, SIGNED>(at, rows, (v, f), map, cells),
             }
+        }
+        let (rows, f) = (&self.rows[own.range.clone()], &linear[own.range.clone()]);
+        let v = &direction[own.index];
+        if own.kind == JointKind::Prismatic {
+            return self.project_slide::<T, WANTED, SIGNED>(at, rows, v, map, cells);
+        }
+        let (Some((last, rows)), Some((_, f))) = (rows.split_last(), f.split_last()) else {
+            return;
+        };
+        self.project_direction::<T, ABOUT_Z, WANTED, SIGNED>(at, rows, (v, f), map, cells);
+        let row = window(cells, *last);
+        for part in 0..T::PARTS {
+            let at = T::part(at, part);
+            let tensor = self.tensor::<T, ABOUT_Z, WANTED>(at, read(at, v), map);
+            self.put_tensor::<T, WANTED, SIGNED>(at, row, &tensor);
+            let [x, y] = [T::read(at, &map.a[0]), T::read(at, &map.a[1])];
+            self.put::<T, WANTED, SIGNED>(at, 6, row, y);
+            self.put::<T, WANTED, SIGNED>(at, 7, row, -x);
         }
     }
 
     /// Rows of parallel revolute joints: what the tensor's columns say is the same in all of them.
     #[inline(always)]
-    fn project_direction<const FORM: u8, const WANTED: u16>(
+    fn project_direction<T: Lane, const FORM: u8, const WANTED: u16, const SIGNED: bool>(
         &self,
-        joint: &KernelJoint,
-        range: Range<usize>,
-        (v, linear): (V3<T>, &[V3<T::Cell>]),
-        map: &WrenchMap<T>,
+        at: T::At,
+        rows: &[usize],
+        (v, linear): (&V3<T::Cell>, &[V3<T::Cell>]),
+        map: &WrenchMap<T::Cell>,
         cells: &mut [T::Cell],
     ) {
-        let mut tensor = [v[0]; 6];
-        for k in 0..6 {
-            if self.link.wants::<WANTED>(k) {
-                tensor[k] = map.tensor_entry::<FORM>(k, v);
+        for part in 0..T::PARTS {
+            let at = T::part(at, part);
+            let v = read(at, v);
+            let tensor = self.tensor::<T, FORM, WANTED>(at, v, map);
+            for (&row, f) in rows.iter().zip(linear) {
+                let (row, f) = (window(cells, row), read(at, f));
+                self.put_tensor::<T, WANTED, SIGNED>(at, row, &tensor);
+                self.put_moments::<T, FORM, WANTED, SIGNED>(at, row, (v, f), map);
             }
         }
-        for k in range {
-            let row = self.row::<WANTED>(joint, k, cells);
-            let f = read(self.at, &linear[k]);
-            for k in 0..10 {
-                if self.link.wants::<WANTED>(k) {
-                    let entry = if k < 6 {
-                        tensor[k]
-                    } else {
-                        map.moment_entry::<FORM>(k, v, f)
-                    };
-                    self.put::<WANTED>(k, row, entry);
-                }
+    }
+
+    // One line an entry, not loops over them: only so is it certain that the compiler knows which entry it has.
+
+    /// What the columns of the tensor hold, where they are wanted, for an axis along `v`.
+    #[inline(always)]
+    fn tensor<T: Lane, const FORM: u8, const WANTED: u16>(
+        &self,
+        at: T::At,
+        v: V3<T>,
+        map: &WrenchMap<T::Cell>,
+    ) -> [T; 6] {
+        [
+            self.tensor_entry::<T, FORM, WANTED>(at, 0, v, map),
+            self.tensor_entry::<T, FORM, WANTED>(at, 1, v, map),
+            self.tensor_entry::<T, FORM, WANTED>(at, 2, v, map),
+            self.tensor_entry::<T, FORM, WANTED>(at, 3, v, map),
+            self.tensor_entry::<T, FORM, WANTED>(at, 4, v, map),
+            self.tensor_entry::<T, FORM, WANTED>(at, 5, v, map),
+        ]
+    }
+
+    #[inline(always)]
+    fn tensor_entry<T: Lane, const FORM: u8, const WANTED: u16>(
+        &self,
+        at: T::At,
+        k: usize,
+        v: V3<T>,
+        map: &WrenchMap<T::Cell>,
+    ) -> T {
+        if self.link.wants::<WANTED>(k) {
+            map.tensor_entry::<T, FORM>(at, k, v)
+        } else {
+            v[0]
+        }
+    }
+
+    #[inline(always)]
+    fn put_tensor<T: Lane, const WANTED: u16, const SIGNED: bool>(
+        &self,
+        at: T::At,
+        row: &mut [T::Cell; ROOM],
+        tensor: &[T; 6],
+    ) {
+        self.put::<T, WANTED, SIGNED>(at, 0, row, tensor[0]);
+        self.put::<T, WANTED, SIGNED>(at, 1, row, tensor[1]);
+        self.put::<T, WANTED, SIGNED>(at, 2, row, tensor[2]);
+        self.put::<T, WANTED, SIGNED>(at, 3, row, tensor[3]);
+        self.put::<T, WANTED, SIGNED>(at, 4, row, tensor[4]);
+        self.put::<T, WANTED, SIGNED>(at, 5, row, tensor[5]);
+    }
+
+    #[inline(always)]
+    fn put_moments<T: Lane, const FORM: u8, const WANTED: u16, const SIGNED: bool>(
+        &self,
+        at: T::At,
+        row: &mut [T::Cell; ROOM],
+        axis: (V3<T>, V3<T>),
+        map: &WrenchMap<T::Cell>,
+    ) {
+        self.put_moment::<T, FORM, WANTED, SIGNED>(at, 6, row, axis, map);
+        self.put_moment::<T, FORM, WANTED, SIGNED>(at, 7, row, axis, map);
+        self.put_moment::<T, FORM, WANTED, SIGNED>(at, 8, row, axis, map);
+        self.put_moment::<T, FORM, WANTED, SIGNED>(at, 9, row, axis, map);
+    }
+
+    #[inline(always)]
+    fn put_moment<T: Lane, const FORM: u8, const WANTED: u16, const SIGNED: bool>(
+        &self,
+        at: T::At,
+        k: usize,
+        row: &mut [T::Cell; ROOM],
+        (v, f): (V3<T>, V3<T>),
+        map: &WrenchMap<T::Cell>,
+    ) {
+        if self.link.wants::<WANTED>(k) {
+            let entry = map.moment_entry::<T, FORM>(at, k, v, f);
+            self.put::<T, WANTED, SIGNED>(at, k, row, entry);
+        }
+    }
+
+    /// Row of a slide along `v`: it feels no turning.
+    #[inline(always)]
+    fn project_slide<T: Lane, const WANTED: u16, const SIGNED: bool>(
+        &self,
+        at: T::At,
+        rows: &[usize],
+        v: &V3<T::Cell>,
+        map: &WrenchMap<T::Cell>,
+        cells: &mut [T::Cell],
+    ) {
+        for &row in rows {
+            let row = window(cells, row);
+            for part in 0..T::PARTS {
+                let at = T::part(at, part);
+                // As if the axis had no angular part.
+                let axis = (zero(at), read(at, v));
+                self.put_moments::<T, SLIDE, WANTED, SIGNED>(at, row, axis, map);
             }
         }
     }
 
     /// Rows of a link whose frame stands apart from its joint's.
     #[inline(always)]
-    fn project_posed(
+    fn project_posed<T: Lane>(
         &self,
-        joint: &KernelJoint,
-        map: &WrenchMap<T>,
+        at: T::At,
         (rotation, translation): (&[[f64; 3]; 3], [f64; 3]),
-        kinematics: &Kinematics<T::Cell>,
+        kinematics: &mut Kinematics<T::Cell>,
         cells: &mut [T::Cell],
     ) {
-        let map = WrenchMap::new(&map.motion_at(rotation, translation));
-        for d in &joint.directions {
-            for k in d.range.clone() {
-                let axis = kinematics.axis::<T>(self.at, self.j, d, k);
-                let axis = axis.at(rotation, translation);
-                let row = self.row::<ASK>(joint, k, cells);
-                for k in 0..10 {
-                    if self.link.wants::<ASK>(k) {
-                        let entry = if k < 6 {
-                            map.tensor_entry::<ANY>(k, axis.angular)
-                        } else {
-                            map.moment_entry::<ANY>(k, axis.angular, axis.linear)
-                        };
-                        self.put::<ASK>(k, row, entry);
-                    }
+        for part in 0..T::PARTS {
+            let at = T::part(at, part);
+            let own = LinkMotion::<T>::read(at, &kinematics.motion[self.j]);
+            let motion = WrenchMap::new(&own).motion_at(&own, rotation, translation);
+            WrenchMap::new(&motion).write(at, &mut kinematics.map);
+            for d in &self.joint.directions {
+                for k in d.range.clone() {
+                    let axis = kinematics.axis::<T>(at, self.j, d, k);
+                    let axis = axis.at(rotation, translation);
+                    let (map, row) = (&kinematics.map, window(cells, self.rows[k]));
+                    let tensor = self.tensor::<T, ANY, ASK>(at, axis.angular, map);
+                    self.put_tensor::<T, ASK, false>(at, row, &tensor);
+                    let axis = (axis.angular, axis.linear);
+                    self.put_moments::<T, ANY, ASK, false>(at, row, axis, map);
                 }
             }
         }
     }
 
-    /// The link's cells in the row of the `k`-th joint on its path.
+    /// Writes an entry to its place, if it is wanted.
     #[inline(always)]
-    fn row<'r, const WANTED: u16>(
+    fn put<T: Lane, const WANTED: u16, const SIGNED: bool>(
         &self,
-        joint: &KernelJoint,
+        at: T::At,
         k: usize,
-        cells: &'r mut [T::Cell],
-    ) -> &'r mut [T::Cell] {
-        let first = self.layout.row(self.j, k, joint.path[k]);
-        &mut cells[first..][..self.layout.length::<WANTED>(self.link)]
+        row: &mut [T::Cell; ROOM],
+        value: T,
+    ) {
+        if !self.link.wants::<WANTED>(k) {
+            return;
+        }
+        let value = if SIGNED {
+            value.flipped(self.link.sign[k])
+        } else {
+            value
+        };
+        value.write(at, &mut row[self.link.rank::<WANTED>(k)]);
     }
+}
 
-    #[inline(always)]
-    fn put<const WANTED: u16>(&self, k: usize, row: &mut [T::Cell], value: T) {
-        self.layout
-            .put::<T, WANTED>(self.at, self.link, k, row, value);
-    }
+/// The cells a link's entries lie in: the index is checked here, once.
+#[inline(always)]
+fn window<C>(cells: &mut [C], first: usize) -> &mut [C; ROOM] {
+    let Some(window) = cells[first..].first_chunk_mut() else {
+        panic!("no room for the entries of a link");
+    };
+    window
 }

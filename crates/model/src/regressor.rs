@@ -2,8 +2,8 @@
 
 use crate::lane::{Kernel, Lane};
 use crate::model::Model;
+use crate::packing::{Rows, Target};
 use crate::parameter::Columns;
-use crate::plan::Plan;
 use crate::projection::{Kinematics, fill};
 use crate::states::{JointState, JointStates, LaneStates};
 use crate::wide::{F64x8, over_eight, over_one};
@@ -34,8 +34,9 @@ pub fn torque_regressor(model: &Model, columns: &Columns, state: &JointState) ->
 /// Room for [`torque_regressor_into`], and the plan of the columns: made once, used for many samples.
 #[derive(Debug, Clone)]
 pub struct RegressorWorkspace {
-    plan: Plan,
+    rows: Rows,
     kinematics: Kinematics<f64>,
+    cells: Vec<f64>,
 }
 
 impl RegressorWorkspace {
@@ -45,20 +46,25 @@ impl RegressorWorkspace {
     /// If a column does not fit the model.
     #[track_caller]
     pub fn new(model: &Model, columns: &Columns) -> Self {
+        let rows = Rows::new(model, columns);
         Self {
-            plan: Plan::new(model, columns),
+            cells: vec![0.0; rows.n_cells],
+            rows,
             kinematics: Kinematics::new(model, [0.0, 1.0]),
         }
     }
 
-    fn fill_rows(&mut self, model: &Model, state: &JointState, rows: &mut [f64]) {
-        over_one(&mut Fill {
+    fn fill_rows(&mut self, model: &Model, state: &JointState, out: &mut [f64]) {
+        over_one(&mut Fill::<_, true> {
             model,
-            plan: &self.plan,
+            rows: self.rows.all(),
             state: [&state.q, &state.qd, &state.qdd],
             kinematics: &mut self.kinematics,
-            rows,
+            cells: &mut self.cells,
         });
+        for (entry, &place) in out.iter_mut().zip(&self.rows.places) {
+            *entry = self.cells[place];
+        }
     }
 }
 
@@ -75,16 +81,15 @@ pub fn torque_regressor_into(
 ) {
     let n = model.n_joints();
     assert_eq!(
-        (state.q.len(), workspace.plan.links.len()),
+        (state.q.len(), workspace.rows.plan.links.len()),
         (n, n),
         "the state or the workspace has another number of joints than the model"
     );
     assert_eq!(
         out.len(),
-        n * workspace.plan.n_columns,
+        n * workspace.rows.plan.n_columns,
         "out is not joints × columns"
     );
-    out.fill(0.0);
     workspace.fill_rows(model, state, out);
 }
 
@@ -95,6 +100,8 @@ pub struct RegressorBlock {
     n_samples: usize,
     n_joints: usize,
     n_columns: usize,
+    /// At `joint * n_columns + column`: where the entry is.
+    places: Vec<usize>,
     entries: Vec<F64x8>,
 }
 
@@ -102,12 +109,26 @@ impl RegressorBlock {
     /// Samples side by side in a full block.
     pub const LANES: usize = 8;
 
-    pub(crate) fn new(n_joints: usize, n_columns: usize) -> Self {
+    /// Only what can be other than zero has a place of its own.
+    pub(crate) fn packed(rows: &Rows) -> Self {
+        Self {
+            first_sample: 0,
+            n_samples: 0,
+            n_joints: rows.plan.links.len(),
+            n_columns: rows.plan.n_columns,
+            places: rows.places.clone(),
+            entries: vec![F64x8::ZERO; rows.n_cells],
+        }
+    }
+
+    /// Every entry has a place of its own.
+    pub(crate) fn dense(n_joints: usize, n_columns: usize) -> Self {
         Self {
             first_sample: 0,
             n_samples: 0,
             n_joints,
             n_columns,
+            places: (0..n_joints * n_columns).collect(),
             entries: vec![F64x8::ZERO; n_joints * n_columns],
         }
     }
@@ -148,12 +169,12 @@ impl RegressorBlock {
 
     /// One entry of the regressor for the eight samples; beyond `n_samples` the last sample is repeated.
     pub fn lanes(&self, joint: usize, column: usize) -> &[f64; 8] {
-        &self.entries[joint * self.n_columns + column].0
+        &self.entries[self.places[joint * self.n_columns + column]].0
     }
 
     /// One entry for the eight samples, to fill in: of a block of weights.
     pub fn lanes_mut(&mut self, joint: usize, column: usize) -> &mut [f64; 8] {
-        &mut self.entries[joint * self.n_columns + column].0
+        &mut self.entries[self.places[joint * self.n_columns + column]].0
     }
 
     /// One row of one sample.
@@ -163,9 +184,9 @@ impl RegressorBlock {
     #[track_caller]
     pub fn copy_row(&self, joint: usize, lane: usize, out: &mut [f64]) {
         assert_eq!(out.len(), self.n_columns, "a row has one entry a column");
-        let row = &self.entries[joint * self.n_columns..][..self.n_columns];
-        for (x, e) in out.iter_mut().zip(row) {
-            *x = e.0[lane];
+        let row = &self.places[joint * self.n_columns..][..self.n_columns];
+        for (x, &place) in out.iter_mut().zip(row) {
+            *x = self.entries[place].0[lane];
         }
     }
 }
@@ -198,7 +219,7 @@ pub fn visit_torque_regressor(
 /// Fills blocks of the regressor one by one, for a reader that keeps several of them.
 #[derive(Debug, Clone)]
 pub struct BlockFiller {
-    plan: Plan,
+    rows: Rows,
     lanes: LaneStates,
     kinematics: Kinematics<F64x8>,
 }
@@ -211,7 +232,7 @@ impl BlockFiller {
     #[track_caller]
     pub fn new(model: &Model, columns: &Columns) -> Self {
         Self {
-            plan: Plan::new(model, columns),
+            rows: Rows::new(model, columns),
             lanes: LaneStates::new(model.n_joints()),
             kinematics: Kinematics::new(model, [F64x8::ZERO, F64x8::ONE]),
         }
@@ -219,7 +240,7 @@ impl BlockFiller {
 
     /// A block of the right shape, all zero. Only [`Self::fill`] of this filler's columns may write to it.
     pub fn block(&self) -> RegressorBlock {
-        RegressorBlock::new(self.plan.links.len(), self.plan.n_columns)
+        RegressorBlock::packed(&self.rows)
     }
 
     /// Writes the regressor of the samples from `first` on.
@@ -235,12 +256,12 @@ impl BlockFiller {
     ) {
         block.move_to(first, states.n_samples());
         self.lanes.load(states, first);
-        let fill = Fill {
+        let fill = Fill::<_, true> {
             model,
-            plan: &self.plan,
+            rows: self.rows.all(),
             state: self.lanes.state(),
             kinematics: &mut self.kinematics,
-            rows: &mut block.entries,
+            cells: &mut block.entries,
         };
         fill.over_eight();
     }
@@ -270,15 +291,15 @@ pub fn observation_matrix(model: &Model, columns: &Columns, states: &JointStates
 }
 
 /// [`fill`] as one operation to be compiled for an instruction set.
-pub(crate) struct Fill<'a, C> {
+pub(crate) struct Fill<'a, C, const SIGNED: bool> {
     pub(crate) model: &'a Model,
-    pub(crate) plan: &'a Plan,
+    pub(crate) rows: Target<'a>,
     pub(crate) state: [&'a [C]; 3],
     pub(crate) kinematics: &'a mut Kinematics<C>,
-    pub(crate) rows: &'a mut [C],
+    pub(crate) cells: &'a mut [C],
 }
 
-impl Fill<'_, F64x8> {
+impl<const SIGNED: bool> Fill<'_, F64x8, SIGNED> {
     /// Compiled here once: a generic caller would otherwise be compiled with all of it in every crate.
     #[inline(never)]
     pub(crate) fn over_eight(mut self) {
@@ -286,16 +307,16 @@ impl Fill<'_, F64x8> {
     }
 }
 
-impl<C> Kernel<C> for Fill<'_, C> {
+impl<C: Copy, const SIGNED: bool> Kernel<C> for Fill<'_, C, SIGNED> {
     #[inline(always)]
     fn run<T: Lane<Cell = C>>(&mut self, at: T::At) {
-        fill::<T>(
+        fill::<T, SIGNED>(
             at,
             self.model,
-            self.plan,
+            self.rows,
             self.state,
             self.kinematics,
-            self.rows,
+            self.cells,
         );
     }
 }

@@ -46,6 +46,8 @@ impl Neg for Dual {
 impl Lane for Dual {
     type At = ();
     type Cell = Self;
+    const PARTS: usize = 1;
+    fn part((): (), _: usize) {}
     fn splat((): (), x: f64) -> Self {
         dual(x, 0.0)
     }

@@ -1,13 +1,13 @@
 //! The torque regressor of many samples, laid out for products of its columns.
 
-use crate::lane::{Kernel, Lane};
 use crate::model::Model;
-use crate::packing::{Packed, Packing};
+use crate::packing::{Packing, ROOM, Target};
 use crate::parameter::Columns;
 use crate::plan::Plan;
-use crate::projection::{Kinematics, fill_as};
+use crate::projection::Kinematics;
+use crate::regressor::Fill;
 use crate::states::{JointStates, LaneStates, eight};
-use crate::wide::{F64x8, over_eight};
+use crate::wide::F64x8;
 
 /// Samples side by side in a block.
 const LANES: usize = 8;
@@ -26,7 +26,7 @@ pub struct RegressorTiles {
     /// First cell of each joint's row: of the first block, and of the one being filled.
     first: Vec<usize>,
     here: Vec<usize>,
-    /// Where the links' and drives' cells of the block being filled begin, as [`Packed`] wants them.
+    /// Where the links' and drives' cells of the block being filled begin, as [`Target`] wants them.
     rows: Vec<usize>,
     drives: Vec<usize>,
     /// Tiles of each joint's row.
@@ -73,7 +73,7 @@ impl RegressorTiles {
             width,
             capacity,
             n_blocks: 0,
-            cells: vec![F64x8::ZERO; n_cells],
+            cells: vec![F64x8::ZERO; n_cells + ROOM],
         }
     }
 
@@ -106,11 +106,11 @@ impl RegressorTiles {
         for block in 0..self.n_blocks {
             self.go_to(block);
             self.lanes.load(states, first + block * LANES);
-            let fill = FillPacked {
+            let fill = Fill::<_, false> {
                 model,
-                plan: &self.plan,
-                layout: Packed {
-                    rows: &self.rows,
+                rows: Target {
+                    plan: &self.plan,
+                    links: &self.rows,
                     drives: &self.drives,
                 },
                 state: self.lanes.state(),
@@ -173,38 +173,6 @@ impl RegressorTiles {
     /// Key and sign of every column: the column is the entry, or its negative.
     pub fn columns(&self) -> &[(usize, f64)] {
         &self.packing.columns
-    }
-}
-
-/// The regressor of eight samples as one operation to be compiled for an instruction set.
-struct FillPacked<'a> {
-    model: &'a Model,
-    plan: &'a Plan,
-    layout: Packed<'a>,
-    state: [&'a [F64x8]; 3],
-    kinematics: &'a mut Kinematics<F64x8>,
-    cells: &'a mut [F64x8],
-}
-
-impl FillPacked<'_> {
-    /// Compiled here once.
-    #[inline(never)]
-    fn over_eight(mut self) {
-        over_eight(&mut self);
-    }
-}
-
-impl Kernel<F64x8> for FillPacked<'_> {
-    #[inline(always)]
-    fn run<T: Lane<Cell = F64x8>>(&mut self, at: T::At) {
-        fill_as::<T, _>(
-            at,
-            self.model,
-            (self.plan, self.layout),
-            self.state,
-            self.kinematics,
-            self.cells,
-        );
     }
 }
 

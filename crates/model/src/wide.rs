@@ -33,9 +33,6 @@ pub(crate) struct Part<S> {
 }
 
 impl<S: Simd> Wide<S> {
-    /// Registers an [`F64x8`] takes, a power of two.
-    const PARTS: usize = 8 / S::F64_LANES;
-
     #[inline(always)]
     fn with(self, x: S::f64s) -> Self {
         Self { simd: self.simd, x }
@@ -77,6 +74,15 @@ impl<S: Simd> Neg for Wide<S> {
 impl<S: Simd> Lane for Wide<S> {
     type At = Part<S>;
     type Cell = F64x8;
+    // A power of two.
+    const PARTS: usize = 8 / S::F64_LANES;
+    #[inline(always)]
+    fn part(at: Part<S>, part: usize) -> Part<S> {
+        Part {
+            simd: at.simd,
+            part,
+        }
+    }
     #[inline(always)]
     fn splat(at: Part<S>, x: f64) -> Self {
         Self {
@@ -146,6 +152,88 @@ impl<S: Simd> Lane for Wide<S> {
     }
 }
 
+/// Two registers side by side: where eight samples take two, what is decided for one is decided for both.
+#[derive(Clone, Copy)]
+pub(crate) struct Two<S: Simd>(Wide<S>, Wide<S>);
+
+impl<S: Simd> Add for Two<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self(self.0 + o.0, self.1 + o.1)
+    }
+}
+
+impl<S: Simd> Sub for Two<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Self(self.0 - o.0, self.1 - o.1)
+    }
+}
+
+impl<S: Simd> Mul for Two<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, o: Self) -> Self {
+        Self(self.0 * o.0, self.1 * o.1)
+    }
+}
+
+impl<S: Simd> Neg for Two<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0, -self.1)
+    }
+}
+
+impl<S: Simd> Lane for Two<S> {
+    type At = Part<S>;
+    type Cell = F64x8;
+    const PARTS: usize = Wide::<S>::PARTS / 2;
+    #[inline(always)]
+    fn part(at: Part<S>, part: usize) -> Part<S> {
+        Wide::part(at, 2 * part)
+    }
+    #[inline(always)]
+    fn splat(at: Part<S>, x: f64) -> Self {
+        Self(Wide::splat(at, x), Wide::splat(at, x))
+    }
+    #[inline(always)]
+    fn like(self, x: f64) -> Self {
+        Self(self.0.like(x), self.1.like(x))
+    }
+    #[inline(always)]
+    fn read(at: Part<S>, cell: &F64x8) -> Self {
+        let next = Wide::part(at, at.part + 1);
+        Self(Wide::read(at, cell), Wide::read(next, cell))
+    }
+    #[inline(always)]
+    fn write(self, at: Part<S>, cell: &mut F64x8) {
+        self.0.write(at, cell);
+        self.1.write(Wide::part(at, at.part + 1), cell);
+    }
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        Self(self.0.mul_add(a.0, b.0), self.1.mul_add(a.1, b.1))
+    }
+    #[inline(always)]
+    fn sin_cos(self, quarters: u64) -> (Self, Self) {
+        let (s, c) = self.0.sin_cos(quarters);
+        let (next_s, next_c) = self.1.sin_cos(quarters);
+        (Self(s, next_s), Self(c, next_c))
+    }
+    #[inline(always)]
+    fn sign(self) -> Self {
+        Self(self.0.sign(), self.1.sign())
+    }
+    #[inline(always)]
+    fn flipped(self, sign: f64) -> Self {
+        Self(self.0.flipped(sign), self.1.flipped(sign))
+    }
+}
+
 /// Replaces sine and cosine of the angles beyond the reduction's limit; they are rare, and done one by one.
 #[cold]
 #[inline(never)]
@@ -172,7 +260,16 @@ pub(crate) fn over_eight(kernel: &mut impl Kernel<F64x8>) {
 /// The same with these instructions.
 #[inline]
 pub(crate) fn over_eight_on(arch: Arch, kernel: &mut impl Kernel<F64x8>) {
-    arch.dispatch(Eight(kernel));
+    match arch {
+        #[cfg(target_arch = "x86_64")]
+        Arch::V4(simd) => Simd::vectorize(*simd, Eight(kernel)),
+        #[cfg(target_arch = "x86_64")]
+        Arch::V3(simd) => Simd::vectorize(simd, EightByTwo(kernel)),
+        #[cfg(target_arch = "x86_64")]
+        _ => Simd::vectorize(pulp::Scalar, Eight(kernel)),
+        #[cfg(not(target_arch = "x86_64"))]
+        _ => arch.dispatch(Eight(kernel)),
+    }
 }
 
 /// Runs a kernel over one sample, with fused multiply-add where the machine has it.
@@ -197,14 +294,31 @@ impl<K: Kernel<F64x8>> WithSimd for Eight<'_, K> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        // One number at the alignment of a register on the stack: only then does the compiler align what it spills there,
-        // too. A register across two cache lines is slow to store and slower to read back.
-        let mut aligned = F64x8::ZERO;
-        std::hint::black_box(&mut aligned);
-        for part in 0..Wide::<S>::PARTS {
-            self.0.run::<Wide<S>>(Part { simd, part });
-        }
+        align_spills();
+        self.0.run::<Wide<S>>(Part { simd, part: 0 });
     }
+}
+
+#[cfg(target_arch = "x86_64")]
+struct EightByTwo<'a, K>(&'a mut K);
+
+#[cfg(target_arch = "x86_64")]
+impl<K: Kernel<F64x8>> WithSimd for EightByTwo<'_, K> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        align_spills();
+        self.0.run::<Two<S>>(Part { simd, part: 0 });
+    }
+}
+
+/// One number at the alignment of a register on the stack: only then does the compiler align what it spills there, too. A
+/// register across two cache lines is slow to store and slower to read back.
+#[inline(always)]
+fn align_spills() {
+    let mut aligned = F64x8::ZERO;
+    std::hint::black_box(&mut aligned);
 }
 
 struct One<'a, K>(&'a mut K);
@@ -234,13 +348,16 @@ mod tests {
     impl Kernel<F64x8> for Functions {
         #[inline(always)]
         fn run<T: Lane<Cell = F64x8>>(&mut self, at: T::At) {
-            let x = T::read(at, &self.x);
-            let (s, c) = x.sin_cos(self.quarters);
-            let [sine, cosine, sign, fused] = &mut self.out;
-            s.write(at, sine);
-            c.write(at, cosine);
-            x.sign().write(at, sign);
-            s.mul_add(x, -c).write(at, fused);
+            for part in 0..T::PARTS {
+                let at = T::part(at, part);
+                let x = T::read(at, &self.x);
+                let (s, c) = x.sin_cos(self.quarters);
+                let [sine, cosine, sign, fused] = &mut self.out;
+                s.write(at, sine);
+                c.write(at, cosine);
+                x.sign().write(at, sign);
+                s.mul_add(x, -c).write(at, fused);
+            }
         }
     }
 
