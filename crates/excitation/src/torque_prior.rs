@@ -204,9 +204,7 @@ impl TorquePrior {
             for known in self.known_of(j) {
                 for (k, s) in slope.iter().enumerate().filter(|(_, s)| **s != 0.0) {
                     let q = states.q(j)[k];
-                    // Guides the search only; the proof goes by `known_change`.
-                    let rise = (known.at(q + STEP) - known.at(q - STEP)) / (2.0 * STEP);
-                    by_states.q_mut(j)[k] += s * rise;
+                    by_states.q_mut(j)[k] += s * known.slope(q);
                 }
             }
         }
@@ -214,8 +212,6 @@ impl TorquePrior {
     }
 }
 
-/// Step of the slope of a known torque, rad (m): the root of the rounding, times a joint's usual range.
-const STEP: f64 = 1e-6;
 /// Positions looked at where a joint states no limits: a turn either way.
 const TURN: f64 = std::f64::consts::TAU;
 /// Halvings of a range before a formula counts as unbounded.

@@ -9,6 +9,7 @@ use nalgebra::Vector3;
 mod check;
 mod drives;
 mod formula;
+mod formula_slope;
 mod interval;
 mod known_torque;
 mod shapes;

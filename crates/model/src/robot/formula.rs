@@ -146,7 +146,7 @@ impl Formula {
 }
 
 impl Function {
-    fn of(self, x: f64) -> f64 {
+    pub(super) fn of(self, x: f64) -> f64 {
         match self {
             Self::Negative => -x,
             Self::Abs => x.abs(),
@@ -179,7 +179,7 @@ impl Function {
 }
 
 impl Operation {
-    fn of(self, a: f64, b: f64) -> f64 {
+    pub(super) fn of(self, a: f64, b: f64) -> f64 {
         match self {
             Self::Add => a + b,
             Self::Subtract => a - b,

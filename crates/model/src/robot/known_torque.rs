@@ -165,6 +165,27 @@ impl KnownTorque {
         }
     }
 
+    /// Slope of [`Self::at`], N·m/rad (N/m); of a kink, that of one side, and zero beyond the ends of a table.
+    pub fn slope(&self, q: f64) -> f64 {
+        match &self.curve {
+            Curve::Table(points) => {
+                let after = points.partition_point(|p| p[0] <= q);
+                if after == 0 || after == points.len() {
+                    return 0.0;
+                }
+                let ([q0, t0], [q1, t1]) = (points[after - 1], points[after]);
+                (t1 - t0) / (q1 - q0)
+            }
+            Curve::Formula { steps } => {
+                let mut values = vec![[q, 1.0]];
+                for step in steps {
+                    values.push(step.formula.with_slope(&values));
+                }
+                values.last().map_or(f64::NAN, |value| value[1])
+            }
+        }
+    }
+
     /// Least and greatest torque anywhere from `low` to `high` (rad, m), N·m (N) for a scale of 1.
     ///
     /// Exact for a table. A formula is evaluated on intervals, which bound it from outside, the closer the nearer `low` and
