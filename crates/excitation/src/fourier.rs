@@ -1,8 +1,11 @@
 //! The best Fourier motion for the torque model (Radkhah, Kulić & Croft, sections II.D and III.B).
 
+use crate::added_columns::AddedRows;
 use crate::fourier_rounds::{Outcome, run_rounds, try_at_random};
 use crate::fourier_search::Task;
-use crate::{ClearanceCertificate, Conditioning, Error, FourierOptions, TorqueCertificate};
+use crate::{
+    AddedColumn, ClearanceCertificate, Conditioning, Error, FourierOptions, TorqueCertificate,
+};
 use idim_model::{Columns, Model};
 use idim_trajectory::{Certificate, FourierSeries, Limits};
 use std::sync::atomic::AtomicBool;
@@ -123,7 +126,13 @@ fn design(task: &Task<'_>, outcome: Outcome) -> Result<FourierDesign, Error> {
     let n_samples = REPORT_REFINEMENT * options.n_samples;
     let values = outcome.values.iter();
     Ok(FourierDesign {
-        conditioning: series_conditioning(task.model, task.columns, &best.series, n_samples),
+        conditioning: weighted_conditioning(
+            task.model,
+            (task.columns, &options.added),
+            &best.series,
+            n_samples,
+            &vec![1.0; task.model.n_joints()],
+        ),
         series: best.series,
         certificate: best.certificate,
         torque: best.path.torque,
@@ -147,21 +156,22 @@ pub fn series_conditioning(
 ) -> Conditioning {
     weighted_conditioning(
         model,
-        columns,
+        (columns, &[]),
         series,
         n_samples,
         &vec![1.0; model.n_joints()],
     )
 }
 
-/// As [`series_conditioning`], of the rows divided by the standard deviation of their joint's torque, N·m.
+/// As [`series_conditioning`], with columns beside those of the regressor, of the rows divided by the standard deviation of
+/// their joint's torque, N·m.
 ///
 /// # Panics
 /// As [`series_conditioning`], or if there is not one standard deviation a joint.
 #[track_caller]
 pub fn weighted_conditioning(
     model: &Model,
-    columns: &Columns,
+    (columns, added): (&Columns, &[AddedColumn]),
     series: &FourierSeries,
     n_samples: usize,
     torque_noise: &[f64],
@@ -169,10 +179,16 @@ pub fn weighted_conditioning(
     let n = model.n_joints();
     assert_eq!(torque_noise.len(), n, "one standard deviation per joint");
     let states = series.equispaced_states(n_samples);
-    let mut w = idim_model::observation_matrix(model, columns, &states);
-    for (row, mut entries) in w.row_iter_mut().enumerate() {
-        entries /= torque_noise[row % n];
-    }
-    let w = faer::MatRef::from_column_major_slice(w.as_slice(), w.nrows(), w.ncols());
-    Conditioning::of_rows(w, n_samples)
+    let y = idim_model::observation_matrix(model, columns, &states);
+    let (x, p) = (AddedRows::new(added, &states), columns.len());
+    let w = faer::Mat::from_fn(y.nrows(), p + added.len(), |row, column| {
+        let (sample, joint) = (row / n, row % n);
+        let entry = if column < p {
+            y[(row, column)]
+        } else {
+            x.entry(column - p, joint, sample)
+        };
+        entry / torque_noise[joint]
+    });
+    Conditioning::of_rows(w.as_ref(), n_samples)
 }

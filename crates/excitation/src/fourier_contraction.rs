@@ -33,6 +33,12 @@ impl Contraction {
         }
     }
 
+    /// For each joint, the columns its torque depends on.
+    pub(crate) fn reached(&self) -> &[Vec<usize>] {
+        &self.reached
+    }
+
+    /// `s`: rows and columns beyond those of the regressor are left out.
     pub(crate) fn set_matrix(&mut self, s: MatRef<'_, f64>) {
         for (reached, packed) in self.reached.iter().zip(&mut self.s) {
             packed.clear();

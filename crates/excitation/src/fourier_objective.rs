@@ -3,11 +3,11 @@
 //! With `A = A₀ + Σ Yᵀ D Y` and `S = ∂f/∂A`: `df = 2 Σ_t ⟨D Y_t S, dY_t⟩`, which the model's reverse mode takes to the
 //! states and the transpose of the basis to the coefficients.
 
-use crate::FourierOptions;
+use crate::added_columns::{AddedRows, information_with_added};
 use crate::fourier_contraction::Contraction;
-use crate::information::information_matrix;
 use crate::path_penalty::PathPenalty;
 use crate::spectrum::{SmoothCriterion, SpectralPoint};
+use crate::{AddedColumn, FourierOptions};
 use faer::Mat;
 use idim_model::{Columns, JointStates, Model, regressor_contraction_gradient};
 use idim_trajectory::FourierBasis;
@@ -16,6 +16,7 @@ use idim_trajectory::FourierBasis;
 pub(crate) struct FourierObjective<'a> {
     model: &'a Model,
     columns: &'a Columns,
+    added: &'a [AddedColumn],
     exact: Vec<(f64, SmoothCriterion)>,
     criteria: Vec<(f64, SmoothCriterion)>,
     basis: FourierBasis,
@@ -48,6 +49,7 @@ impl<'a> FourierObjective<'a> {
         Self {
             model,
             columns,
+            added: &options.added,
             exact: criteria.to_vec(),
             criteria: criteria.to_vec(),
             basis: FourierBasis::equispaced(options.period, options.n_harmonics, options.n_samples),
@@ -83,7 +85,8 @@ impl<'a> FourierObjective<'a> {
         self.n_evaluations += 1;
         self.basis.states_into(coefficients, &mut self.states);
         let weights = &self.joint_weights;
-        let mut information = information_matrix(self.model, self.columns, &self.states, weights);
+        let columns = (self.columns, self.added);
+        let mut information = information_with_added(self.model, columns, &self.states, weights);
         if let Some(prior) = &self.prior {
             information += prior;
         }
@@ -101,17 +104,23 @@ impl<'a> FourierObjective<'a> {
 
     /// Gradient where the value was asked for last; zero where that was infinite.
     pub(crate) fn gradient(&mut self) -> Vec<f64> {
-        let n = self.columns.len();
+        let n = self.columns.len() + self.added.len();
         let mut s = Mat::<f64>::zeros(n, n);
         for ((weight, criterion), point) in self.criteria.iter().zip(&self.points) {
             s += faer::Scale(2.0 * weight) * criterion.by_information(point);
         }
-        self.contraction.set_matrix(s.as_ref());
+        let s = s.as_ref();
+        self.contraction.set_matrix(s);
         let (contraction, weights) = (&self.contraction, &self.joint_weights);
-        let by_states =
+        let rows = AddedRows::new(self.added, &self.states);
+        let mut own = rows.zeros();
+        let mut by_states =
             regressor_contraction_gradient(self.model, self.columns, &self.states, |y, g| {
                 contraction.contract(y, weights, g);
+                rows.add_to_weights(s, weights, contraction.reached(), g);
+                rows.own_weights(s, weights, contraction.reached(), y, &mut own);
             });
+        rows.pull_back(self.added, &own, &self.states, &mut by_states);
         let mut gradient = self.basis.pull_back(&by_states);
         if let Some(path) = self.active_path() {
             for (g, p) in gradient.iter_mut().zip(path.gradient()) {
@@ -128,7 +137,7 @@ mod tests {
 
     use super::*;
     use crate::{Criterion, Scaling};
-    use idim_model::robot_from_ron;
+    use idim_model::{KnownTorque, ParameterKind, robot_from_ron};
     use idim_trajectory::{Limits, random_series};
     use proptest::prelude::*;
 
@@ -162,6 +171,59 @@ mod tests {
         )
     }
 
+    /// A motor that turns with the last two joints, and a spring.
+    fn added() -> Vec<AddedColumn> {
+        let motor = |kind| AddedColumn::Motor {
+            kind,
+            turns: vec![0.0, 0.7, 1.0],
+        };
+        let spring = KnownTorque::from_formula("spring", 1, &[], "sin(q) * sqrt(1.5 - cos(q))");
+        vec![
+            motor(ParameterKind::Ia),
+            motor(ParameterKind::Fv),
+            AddedColumn::Known(spring.unwrap()),
+        ]
+    }
+
+    #[test]
+    fn identity_added_columns_are_columns_of_the_information() {
+        let model = Model::new(&robot_from_ron(idim_fixtures::PUMA3R).unwrap());
+        let (columns, mut added) = (columns(), added());
+        added.push(AddedColumn::Motor {
+            kind: ParameterKind::Fc,
+            turns: vec![-0.3, 0.0, 1.0],
+        });
+        let states =
+            idim_model::random_states(&robot_from_ron(idim_fixtures::PUMA3R).unwrap(), 21, 3);
+        let weights = [0.5_f64, 2.0, 3.0];
+        let y = idim_model::observation_matrix(&model, &columns, &states);
+        // Each entry once more, from the words of the equations: with m = Σ turns q, τ_j = turns_j (Ia m̈ + Fv ṁ + Fc sign ṁ).
+        let x = |column: usize, sample: usize, joint: usize| {
+            let s = states.state(sample);
+            match column {
+                0 => [0.0, 0.7, 1.0][joint] * (0.7 * s.qdd[1] + s.qdd[2]),
+                1 => [0.0, 0.7, 1.0][joint] * (0.7 * s.qd[1] + s.qd[2]),
+                2 if joint == 1 => s.q[1].sin() * (1.5 - s.q[1].cos()).sqrt(),
+                3 => [-0.3, 0.0, 1.0][joint] * (s.qd[2] - 0.3 * s.qd[0]).signum(),
+                _ => 0.0,
+            }
+        };
+        let w = Mat::from_fn(3 * 21, 17 + 4, |row, c| {
+            let (sample, joint) = (row / 3, row % 3);
+            let entry = if c < 17 {
+                y[(row, c)]
+            } else {
+                x(c - 17, sample, joint)
+            };
+            weights[joint].sqrt() * entry
+        });
+        let expected = w.transpose() * &w;
+        let found = information_with_added(&model, (&columns, &added), &states, &weights);
+        let scale = expected.norm_max();
+        // Sums of 63 terms in another order.
+        assert!((found - expected).norm_max() < 1e-13 * scale);
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(12))]
 
@@ -179,13 +241,15 @@ mod tests {
                 acceleration: vec![6.0; 3],
             };
             let noise = if plain { vec![] } else { vec![0.5, 2.0, 1.0] };
-            let prior = Mat::<f64>::identity(17, 17);
+            let added = if plain { vec![] } else { added() };
+            let prior = Mat::<f64>::identity(17 + added.len(), 17 + added.len());
             let options = FourierOptions {
                 period: 7.0,
                 n_harmonics: 3,
                 // Not a whole number of blocks.
                 n_samples: 45,
                 torque_noise: noise,
+                added,
                 prior_information: (!plain).then_some(prior),
                 ..FourierOptions::default()
             };

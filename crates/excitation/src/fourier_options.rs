@@ -1,7 +1,7 @@
 //! What a search for a Fourier motion is asked for, and whether it makes sense.
 
 use crate::spectrum::SmoothCriterion;
-use crate::{Clearance, Criterion, Error, Scaling, TorquePrior};
+use crate::{AddedColumn, Clearance, Criterion, Error, Scaling, TorquePrior};
 use faer::Mat;
 use idim_model::{Columns, Model};
 use idim_trajectory::{FourierSeries, Limits};
@@ -33,6 +33,8 @@ pub struct FourierOptions {
     pub criterion: Criterion,
     /// Further criteria with their weights, lowered with it: `log criterion + Σ weight · log further` (log det as it is).
     pub further: Vec<(f64, Criterion)>,
+    /// Columns beside those of the regressor that the motion is to reveal as well; they come last.
+    pub added: Vec<AddedColumn>,
     /// Begin and end of the motion.
     pub ends: FourierEnds,
     /// Standard deviation of each joint's torque, N·m, by which its rows are divided; empty: all alike.
@@ -69,6 +71,7 @@ impl Default for FourierOptions {
             n_samples: 100,
             criterion: Criterion::TwoNorm(Scaling::Raw),
             further: Vec::new(),
+            added: Vec::new(),
             ends: FourierEnds::Free,
             torque_noise: Vec::new(),
             prior_information: None,
@@ -115,12 +118,13 @@ pub(crate) fn check(
         criteria.push((weight, smooth));
     }
     check_joints(model, limits, options)?;
+    let n_columns = columns.len() + options.added.len();
     let positive = |x: f64| x > 0.0 && x.is_finite();
     let rows = options.n_samples * model.n_joints();
     let known = options
         .prior_information
         .as_ref()
-        .map_or(columns.len(), Mat::nrows);
+        .map_or(n_columns, Mat::nrows);
     let (harmonics, bounds) = (options.n_harmonics, options.n_constraint_samples);
     let rules = [
         (
@@ -142,7 +146,7 @@ pub(crate) fn check(
             "give at least one",
         ),
         (
-            rows >= columns.len(),
+            rows >= n_columns,
             "samples",
             options.n_samples as f64,
             "they give fewer rows than columns; take more",
@@ -154,10 +158,10 @@ pub(crate) fn check(
             "take more than twice the harmonics",
         ),
         (
-            known == columns.len(),
+            known == n_columns,
             "prior information",
             known as f64,
-            "it has one row and one column for each column of the regressor",
+            "it has one row and one column for each column, added ones included",
         ),
     ];
     for (holds, place, met, rule) in rules {
@@ -192,6 +196,9 @@ fn check_joints(model: &Model, limits: &Limits, options: &FourierOptions) -> Res
             format!("{} joints", limits.n_joints()),
             format!("the model has {n}; give limits for each"),
         ));
+    }
+    for column in &options.added {
+        column.check(n)?;
     }
     let robots = [
         options.torque.as_ref().map(TorquePrior::robot),

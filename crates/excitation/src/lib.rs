@@ -30,6 +30,7 @@
 //! Not here: which columns are independent (`idim-base-params`), families of motion and their limits
 //! (`idim-trajectory`), estimation.
 
+mod added_columns;
 mod box_lbfgs;
 mod clearance;
 mod condition;
@@ -69,6 +70,7 @@ mod spectrum;
 mod torque_prior;
 mod torque_rate;
 
+pub use added_columns::{AddedColumn, information_with_added};
 pub use clearance::Clearance;
 pub use condition::{ConditionNumber, ConditionRoute, condition_number, log_condition_gradient};
 pub use criterion::{ConditionNumbers, Conditioning, Criterion, Equilibrium, Scaling};

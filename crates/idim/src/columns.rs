@@ -1,6 +1,7 @@
 //! The columns of an identification: those of the rigid body and its drives, and those that gears, springs and friction add.
 
 use crate::samples::Stretch;
+use idim_excitation::AddedColumn;
 use idim_model::{Columns, JointKind, KnownTorque, Notation, ParameterKind, Robot};
 
 /// Columns in their order: the model's own first, then the others.
@@ -122,6 +123,18 @@ impl ExtraColumn {
             }
             Self::Known(torque) => torque.name().to_owned(),
             Self::Friction { joint, term } => format!("{}{}", term.word(), joint + 1),
+        }
+    }
+
+    /// The column as a motion is designed for it; `None` for friction beside viscous and Coulomb.
+    pub(crate) fn added(&self) -> Option<AddedColumn> {
+        match self {
+            Self::Motor { kind, turns, .. } => Some(AddedColumn::Motor {
+                kind: *kind,
+                turns: turns.clone(),
+            }),
+            Self::Known(torque) => Some(AddedColumn::Known(torque.clone())),
+            Self::Friction { .. } => None,
         }
     }
 

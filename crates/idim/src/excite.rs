@@ -11,15 +11,16 @@ mod text;
 pub(crate) use arguments::run_excite;
 pub use arguments::{CriterionTerm, ExciteArgs};
 
+use crate::columns::ExtraColumn;
 use crate::error::Error;
 use crate::progress::Progress;
-use crate::structure::{KeepOrder, Structure};
+use crate::structure::Structure;
 use idim_excitation::{
     Clearance, Conditioning, Criterion, FourierDesign, FourierEnds, FourierOptions, FourierWatch,
     TorquePrior, best_random_fourier, optimise_fourier_watched, weighted_conditioning,
 };
 use idim_measurement::Measurements;
-use idim_model::{DriveColumns, Model, Robot};
+use idim_model::{Columns, DriveColumns, Model, Robot};
 use idim_trajectory::{FourierSeries, Limits};
 use interrupt::{Stopped, watched};
 
@@ -105,13 +106,23 @@ pub fn excite(
     options: &ExciteOptions,
     progress: &Progress,
 ) -> Result<Excitation, Error> {
-    let structure = Structure::of_torque(robot, options.columns, KeepOrder::Links).decided()?;
-    let columns = structure.base_columns();
+    let all = Columns::standard(robot.n_joints(), options.columns);
+    let structure = Structure::of_drives(robot, all).decided()?;
+    let base = structure.base_model_columns();
+    let columns = base.standard;
     let model = Model::new(robot);
-    let mut fourier = fourier_options(options);
+    let mut fourier = FourierOptions {
+        added: base.extra.iter().filter_map(ExtraColumn::added).collect(),
+        ..fourier_options(options)
+    };
     if !logs.is_empty() {
         progress.stage("what the logs already tell");
-        fourier.prior_information = Some(prior::information(robot, &columns, logs, options)?);
+        fourier.prior_information = Some(prior::information(
+            robot,
+            (&columns, &fourier.added),
+            logs,
+            options,
+        )?);
     }
     progress.stage(format!("{N_RANDOM} random motions to compare with"));
     let random = best_random_fourier(&model, &columns, limits, &fourier, N_RANDOM).ok();
@@ -137,7 +148,8 @@ pub fn excite(
     let design = found?;
     let weigh = |series: &FourierSeries| {
         let n_samples = 10 * fourier.n_samples;
-        weighted_conditioning(&model, &columns, series, n_samples, &options.torque_noise)
+        let columns = (&columns, &fourier.added[..]);
+        weighted_conditioning(&model, columns, series, n_samples, &options.torque_noise)
     };
     let weighted = (!options.torque_noise.is_empty()).then(|| {
         let random = random.as_ref().map(|r| weigh(&r.series));

@@ -2,6 +2,8 @@
 #![allow(clippy::unwrap_used)]
 
 use clap::Parser;
+use idim::Structure;
+use idim_model::{Columns, DriveColumns, JointState, Model, observation_matrix, robot_from_ron};
 use idim_trajectory::{FourierSeries, Limits, Motion, TrajectoryFile};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -149,6 +151,81 @@ fn regress_rest_weights_and_a_time_budget_are_heard() {
     let certificate = bench.file("out", "certificate.json");
     let reproducible = certificate.contains("\"reproducible\": true");
     assert_ne!(reproducible, text.contains("another machine"), "{text}");
+}
+
+/// Entries of added columns, joint by joint.
+type Added<'a> = &'a dyn Fn(&JointState) -> Vec<Vec<f64>>;
+
+/// A robot file's own columns: the coupled motor of a wrist, a counterbalance.
+#[test]
+fn identity_a_motion_is_designed_for_the_columns_that_identify_uses() {
+    let tx40 = |s: &JointState| {
+        // Motor 6 turns with joints 5 and 6 alike.
+        let (speed, acceleration) = (s.qd[4] + s.qd[5], s.qdd[4] + s.qdd[5]);
+        let motor = [acceleration, speed, speed.signum()];
+        let on = |joint| {
+            if joint >= 4 {
+                motor.to_vec()
+            } else {
+                vec![0.0; 3]
+            }
+        };
+        (0..6).map(on).collect::<Vec<_>>()
+    };
+    let kr300 = |s: &JointState| {
+        let robot = robot_from_ron(idim_fixtures::KR300).unwrap();
+        let known = robot.drives().known_torques[0].at(s.q[1]);
+        let on = |joint| vec![if joint == 1 { known } else { 0.0 }];
+        (0..6).map(on).collect::<Vec<_>>()
+    };
+    let cases: [(&str, &[&str], Added<'_>); 2] = [
+        (idim_fixtures::TX40, &["IaM6", "FvM6", "FcM6"], &tx40),
+        (idim_fixtures::KR300, &["counterbalance"], &kr300),
+    ];
+    for (text, names, added) in cases {
+        let bench = Bench::new();
+        std::fs::write(bench.path("arm.ron"), text).unwrap();
+        let limits = "--position 0.8 --velocity 1 --acceleration 3 --rounds 0 --starts 1";
+        let more: Vec<&str> = limits.split(' ').collect();
+        let (robot, out) = (bench.path("arm.ron"), bench.path("out"));
+        let files = [
+            "--robot",
+            robot.to_str().unwrap(),
+            "--out",
+            out.to_str().unwrap(),
+        ];
+        run(&[&files[..], &more].concat()).unwrap();
+        let certificate: serde_json::Value =
+            serde_json::from_str(&bench.file("out", "certificate.json")).unwrap();
+        let base: Vec<&str> = certificate["base_parameters"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|name| name.as_str().unwrap())
+            .collect();
+        assert!(base.ends_with(names), "{base:?}");
+        // The condition number of all of them, over the samples of the report.
+        let robot = robot_from_ron(text).unwrap();
+        let structure = Structure::of_drives(&robot, Columns::standard(6, DriveColumns::ALL));
+        let columns = structure.base_columns();
+        let (n_samples, p) = (1000, columns.len());
+        let states = bench.series("out").equispaced_states(n_samples);
+        let y = observation_matrix(&Model::new(&robot), &columns, &states);
+        let extra: Vec<Vec<Vec<f64>>> = (0..n_samples).map(|k| added(&states.state(k))).collect();
+        let w = faer::Mat::from_fn(6 * n_samples, p + names.len(), |row, column| {
+            if column < p {
+                y[(row, column)]
+            } else {
+                extra[row / 6][row % 6][column - p]
+            }
+        });
+        let sigma = w.singular_values().unwrap();
+        let expected = sigma[0] / sigma[sigma.len() - 1];
+        let found = certificate["criteria"]["condition_number"]["raw"]
+            .as_f64()
+            .unwrap();
+        assert!((found / expected - 1.0).abs() < 1e-9, "{found} {expected}");
+    }
 }
 
 /// What the log of two slow sines tells need not be asked again.

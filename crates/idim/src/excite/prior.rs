@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::plan::{SamplingOptions, SamplingPlan};
 use crate::samples::stretches;
 use faer::Mat;
-use idim_excitation::information_matrix;
+use idim_excitation::{AddedColumn, information_with_added};
 use idim_measurement::Measurements;
 use idim_model::{Columns, Model, Robot};
 
@@ -13,7 +13,7 @@ use idim_model::{Columns, Model, Robot};
 /// recorded at their rate.
 pub(super) fn information(
     robot: &Robot,
-    columns: &Columns,
+    columns: (&Columns, &[AddedColumn]),
     logs: &[Measurements],
     options: &ExciteOptions,
 ) -> Result<Mat<f64>, Error> {
@@ -24,7 +24,8 @@ pub(super) fn information(
     };
     let model = Model::new(robot);
     let plan = SamplingPlan::new(logs, &SamplingOptions::default());
-    let mut sum = Mat::zeros(columns.len(), columns.len());
+    let n_columns = columns.0.len() + columns.1.len();
+    let mut sum = Mat::zeros(n_columns, n_columns);
     for log in logs {
         for stretch in stretches(log, &plan)? {
             let (first, last) = (stretch.time.first(), stretch.time.last());
@@ -36,7 +37,14 @@ pub(super) fn information(
                 continue;
             }
             let interval = (last - first) / (n - 1) as f64;
-            let a = information_matrix(&model, columns, &stretch.states, &weights);
+            let a = information_with_added(&model, columns, &stretch.states, &weights);
+            if !a.is_all_finite() {
+                return Err(Error::input(
+                    log.file.clone(),
+                    "a known torque without a value somewhere in it",
+                    "its formula must have a value wherever the joint moves",
+                ));
+            }
             sum += faer::Scale(interval / options.period) * a;
         }
     }
