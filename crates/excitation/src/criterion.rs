@@ -96,7 +96,7 @@ pub struct ConditionNumbers {
 pub struct Equilibrium {
     /// `S`; infinite when an entry is zero.
     pub ratio: f64,
-    /// Number of entries that are exactly zero.
+    /// Number of entries that are zero to rounding.
     pub n_zero: usize,
     /// `max|W|` over the smallest entry that is not zero.
     pub nonzero_ratio: f64,
@@ -206,13 +206,16 @@ fn ratio(large: f64, small: f64) -> f64 {
     }
 }
 
+/// Entries below this share of the largest are rounding of what is zero: sums of a hundred terms, each to 1e-16.
+const ZERO: f64 = 1e-14;
+
 fn equilibrium(w: MatRef<'_, f64>) -> Equilibrium {
-    let (mut largest, mut smallest, mut n_zero) = (0.0_f64, f64::INFINITY, 0);
+    let largest = w.norm_max();
+    let (mut smallest, mut n_zero) = (f64::INFINITY, 0);
     for j in 0..w.ncols() {
         for i in 0..w.nrows() {
             let a = w[(i, j)].abs();
-            largest = largest.max(a);
-            if a == 0.0 {
+            if a <= ZERO * largest {
                 n_zero += 1;
             } else {
                 smallest = smallest.min(a);

@@ -91,6 +91,8 @@ fn regress_a_motion_with_its_files_comes_out_certified() {
         "Cond, raw",
         "Cond, equilibrated",
         "log det F",
+        "S: max |W| / min |W|",
+        "by the eigenvalues of the information matrix",
         "best random",
         "most used",
     ] {

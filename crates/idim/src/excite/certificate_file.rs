@@ -2,7 +2,7 @@
 
 use super::Excitation;
 use super::interrupt::Stopped;
-use super::text::criterion_name;
+use super::text::{criterion_name, rounding_of_search};
 use idim_excitation::{Conditioning, FourierDesign};
 use idim_model::Robot;
 use idim_trajectory::LimitUse;
@@ -64,6 +64,8 @@ pub(super) fn certificate_json(robot: &Robot, found: &Excitation) -> Value {
             "searches": d.values.len(),
             "evaluations": d.n_evaluations,
             "earlier_logs": found.n_logs,
+            "condition_by": "information matrix",
+            "condition_rounding": rounding_of_search(found),
             "time_budget": o.time_budget,
             "reproducible": found.stopped == Stopped::No,
         },
@@ -75,10 +77,12 @@ pub(super) fn certificate_json(robot: &Robot, found: &Excitation) -> Value {
 
 fn criteria(c: &Conditioning) -> Value {
     json!({
+        "condition_by": "rows",
         "condition_number": { "raw": c.raw.two_norm, "equilibrated": c.equilibrated.two_norm },
         "frobenius_of_information": { "raw": c.raw.frobenius, "equilibrated": c.equilibrated.frobenius },
         "log_det": c.log_det,
         "trace_inverse": c.trace_inverse,
         "smallest_singular_value": c.smallest_singular_value,
+        "equilibrium": c.equilibrium.map(|s| json!({ "ratio": s.nonzero_ratio, "zeros": s.n_zero })),
     })
 }

@@ -4,7 +4,7 @@ use super::Excitation;
 use super::arguments::CRITERIA;
 use super::interrupt::Stopped;
 use crate::table::{number, table};
-use idim_excitation::{Conditioning, FourierDesign};
+use idim_excitation::{Conditioning, Criterion, FourierDesign, Scaling};
 use idim_model::Robot;
 use idim_trajectory::{JointUse, LimitUse};
 use std::fmt::Write as _;
@@ -86,8 +86,45 @@ fn criteria_text(found: &Excitation) -> String {
         "best random",
         "ratio (log: gain)",
     ];
-    format!("\nCriteria of this motion alone\n{}", table(header, rows))
+    format!(
+        "\nCriteria of this motion alone\n{}{}\n",
+        table(header, rows),
+        route_text(found)
+    )
 }
+
+/// Relative error of a condition number from the eigenvalues of the information matrix: `p u cond² / 2`, `u` half an epsilon.
+pub(super) fn rounding_of_search(found: &Excitation) -> f64 {
+    let p = found.structure.reduction.rank() as f64;
+    let unit = |&(_, criterion): &(f64, Criterion)| {
+        let scaling = Scaling::Equilibrated;
+        [Criterion::TwoNorm(scaling), Criterion::Frobenius(scaling)].contains(&criterion)
+    };
+    let conditioning = &found.design.conditioning;
+    let numbers = if found.options.criteria.iter().all(unit) {
+        conditioning.equilibrated
+    } else {
+        conditioning.raw
+    };
+    0.25 * p * f64::EPSILON * numbers.two_norm.powi(2)
+}
+
+/// Which of the ways to a condition number was taken where.
+fn route_text(found: &Excitation) -> String {
+    let error = rounding_of_search(found);
+    let rough = if error < TOO_ROUGH {
+        ""
+    } else {
+        ", too rough to search by: choose an equilibrated criterion, or wider limits"
+    };
+    format!(
+        "Cond in the table: by the singular values of the rows; in the search: by the eigenvalues of the information matrix, \
+         to {error:.0e} of its value{rough}"
+    )
+}
+
+/// A search that cannot tell a percent of its criterion from rounding.
+const TOO_ROUGH: f64 = 1e-2;
 
 type Pick = fn(&Conditioning) -> f64;
 
@@ -122,6 +159,11 @@ fn rows_of(
     picks.push((
         format!("E: 1 / smallest singular value, {word}"),
         |c| 1.0 / c.smallest_singular_value,
+        false,
+    ));
+    picks.push((
+        format!("S: max |W| / min |W|, zeros left out, {word}"),
+        |c| c.equilibrium.map_or(f64::NAN, |s| s.nonzero_ratio),
         false,
     ));
     let cells = |(name, pick, logarithm): (String, Pick, bool)| {
