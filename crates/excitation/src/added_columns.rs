@@ -247,7 +247,7 @@ impl AddedRows {
 /// # Panics
 /// If a shape does not fit the model.
 #[track_caller]
-pub fn information_with_added(
+pub(crate) fn information_with_added(
     model: &Model,
     (columns, added): (&Columns, &[AddedColumn]),
     states: &JointStates,

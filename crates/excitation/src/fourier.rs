@@ -96,6 +96,8 @@ pub fn optimise_fourier_watched(
 
 /// The best of `n_motions` random motions under the same limits: what a search has to beat.
 ///
+/// `enough` is asked before each of them; once it says so, no more are tried: `values` has one number a motion that was.
+///
 /// # Errors
 /// As [`optimise_fourier`].
 pub fn best_random_fourier(
@@ -104,10 +106,11 @@ pub fn best_random_fourier(
     limits: &Limits,
     options: &FourierOptions,
     n_motions: usize,
+    enough: &(dyn Fn() -> bool + Sync),
 ) -> Result<FourierDesign, Error> {
     let stop = AtomicBool::new(false);
     let task = Task::new(model, columns, limits, options, &stop)?;
-    design(&task, try_at_random(&task, n_motions))
+    design(&task, try_at_random(&task, n_motions, enough))
 }
 
 fn design(task: &Task<'_>, outcome: Outcome) -> Result<FourierDesign, Error> {

@@ -49,17 +49,25 @@ impl Outcome {
     }
 }
 
-/// Value of many random motions, each drawn in to meet the limits, and the best of them.
-pub(crate) fn try_at_random(task: &Task<'_>, n_motions: usize) -> Outcome {
-    let searches: Vec<Search> = (0..n_motions)
+/// Value of many random motions, each drawn in to meet the limits, and the best of them; none more once `enough` says so.
+pub(crate) fn try_at_random(
+    task: &Task<'_>,
+    n_motions: usize,
+    enough: &(dyn Fn() -> bool + Sync),
+) -> Outcome {
+    let searches: Vec<Option<Search>> = (0..n_motions)
         .into_par_iter()
         .map(|place| {
+            if enough() {
+                return None;
+            }
             let seed = rng(task.options.seed, usize::MAX, place).random();
             let (n_harmonics, period) = (task.options.n_harmonics, task.options.period);
             let series = random_series(task.limits, n_harmonics, period, seed);
-            task.evaluate(&series.coefficients())
+            Some(task.evaluate(&series.coefficients()))
         })
         .collect();
+    let searches: Vec<Search> = searches.into_iter().flatten().collect();
     let mut outcome = Outcome::empty();
     // Proofs are long: from the best down, the first that has one.
     let mut order: Vec<&Found> = searches.iter().filter_map(|s| s.found.as_ref()).collect();

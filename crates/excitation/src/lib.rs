@@ -70,7 +70,7 @@ mod spectrum;
 mod torque_prior;
 mod torque_rate;
 
-pub use added_columns::{AddedColumn, information_with_added};
+pub use added_columns::AddedColumn;
 pub use clearance::Clearance;
 pub use condition::{ConditionNumber, ConditionRoute, condition_number, log_condition_gradient};
 pub use criterion::{ConditionNumbers, Conditioning, Criterion, Equilibrium, Scaling};

@@ -79,7 +79,8 @@ fn identity_every_criterion_is_lowered_inside_certified_limits() {
         assert_inside(&found.series);
         // Far below anything at random under the same limits.
         let at_random =
-            best_random_fourier(&model, &gk_columns(), &limits(), &options, 100).unwrap();
+            best_random_fourier(&model, &gk_columns(), &limits(), &options, 100, &|| false)
+                .unwrap();
         assert!(at_random.certificate.certified && at_random.values.len() == 100);
         let at_random = best(&at_random);
         let found = best(&found);

@@ -3,7 +3,7 @@
 use crate::check::{CheckArgs, Waiver, run_check};
 use crate::commands::{self, DriveGainsArgs, LoadedRuns, TorqueConstantsArgs};
 use crate::error::Error;
-use crate::excite::{ExciteArgs, run_excite};
+use crate::excite::{ExciteArgs, INTERRUPTED_CODE, run_excite};
 use crate::export::exports;
 use crate::fit::EstimationOptions;
 use crate::friction::parse_friction;
@@ -460,7 +460,10 @@ pub fn main(command: &Command) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::FAILURE
+            match error {
+                Error::Interrupted => ExitCode::from(INTERRUPTED_CODE),
+                _ => ExitCode::FAILURE,
+            }
         }
     }
 }

@@ -64,6 +64,9 @@ pub enum Error {
         /// One line each; empty where they have been shown already.
         text: String,
     },
+    /// Ctrl-C came before there was anything to return.
+    #[error("interrupted before any motion was certified; nothing is written")]
+    Interrupted,
     /// A rule of the command line or of a file that only this crate knows.
     #[error("{place}: {met}; {rule}")]
     Input {

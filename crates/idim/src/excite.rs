@@ -10,6 +10,7 @@ mod text;
 
 pub(crate) use arguments::run_excite;
 pub use arguments::{CriterionTerm, ExciteArgs};
+pub(crate) use interrupt::INTERRUPTED_CODE;
 
 use crate::columns::ExtraColumn;
 use crate::error::Error;
@@ -22,12 +23,15 @@ use idim_excitation::{
 use idim_measurement::Measurements;
 use idim_model::{Columns, DriveColumns, Model, Robot};
 use idim_trajectory::{FourierSeries, Limits};
-use interrupt::{Stopped, watched};
+use interrupt::{Stopped, Watch};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Random motions a found one is shown beside.
 pub const N_RANDOM: usize = 1000;
 /// Samples of a period the criterion looks at, a harmonic: products of three harmonics stay resolved.
 const SAMPLES_PER_HARMONIC: usize = 20;
+/// Share of what is left of a time budget that random motions may use; what is not tried by then stays untried.
+const RANDOM_SHARE: f64 = 0.25;
 /// Rounds of searches where nothing is said.
 const ROUNDS: usize = 2;
 
@@ -56,7 +60,7 @@ pub struct ExciteOptions {
     pub torque: Option<TorquePrior>,
     /// Distances to keep.
     pub clearance: Option<Clearance>,
-    /// Time the search may take, s.
+    /// Time a design may take from the start of the command, s.
     pub time_budget: Option<f64>,
 }
 
@@ -71,12 +75,17 @@ pub struct Excitation {
     pub limits: Limits,
     /// The motion.
     pub design: FourierDesign,
-    /// Best of [`N_RANDOM`] random motions by the same criterion; `None` where none could be certified.
+    /// Best of [`N_RANDOM`] random motions, or of those the time budget allowed, by the same criterion; `None` where none
+    /// could be certified.
     pub random: Option<FourierDesign>,
+    /// Random motions that were tried.
+    pub n_random: usize,
     /// Criteria of the rows divided by the noise, of the motion and of the random one, where noise was given.
     pub weighted: Option<(Conditioning, Option<Conditioning>)>,
     /// Logs whose information counted.
     pub n_logs: usize,
+    /// How they became samples.
+    pub log_choices: Vec<String>,
     pub(crate) stopped: Stopped,
 }
 
@@ -98,7 +107,7 @@ fn lowest(design: &FourierDesign) -> f64 {
 /// interrupts it: then the best so far is returned.
 ///
 /// # Errors
-/// An ambiguous structure, options that make no sense, limits that leave no room.
+/// An ambiguous structure, options that make no sense, limits that leave no room; an interruption before there was anything.
 pub fn excite(
     robot: &Robot,
     limits: &Limits,
@@ -106,49 +115,51 @@ pub fn excite(
     options: &ExciteOptions,
     progress: &Progress,
 ) -> Result<Excitation, Error> {
+    let watch = Watch::begin(options.time_budget);
+    excite_watched(robot, limits, logs, options, progress, &watch)
+}
+
+fn excite_watched(
+    robot: &Robot,
+    limits: &Limits,
+    logs: &[Measurements],
+    options: &ExciteOptions,
+    progress: &Progress,
+    watch: &Watch,
+) -> Result<Excitation, Error> {
     let all = Columns::standard(robot.n_joints(), options.columns);
     let structure = Structure::of_drives(robot, all).decided()?;
     let base = structure.base_model_columns();
-    let columns = base.standard;
+    let columns = &base.standard;
     let model = Model::new(robot);
     let mut fourier = FourierOptions {
         added: base.extra.iter().filter_map(ExtraColumn::added).collect(),
         ..fourier_options(options)
     };
+    let mut log_choices = Vec::new();
     if !logs.is_empty() {
         progress.stage("what the logs already tell");
-        fourier.prior_information = Some(prior::information(
-            robot,
-            (&columns, &fourier.added),
-            logs,
-            options,
-        )?);
+        let earlier = prior::earlier(robot, &base, logs, options)?;
+        fourier.prior_information = Some(earlier.information);
+        log_choices = earlier.choices;
     }
+    watch.check()?;
     progress.stage(format!("{N_RANDOM} random motions to compare with"));
-    let random = best_random_fourier(&model, &columns, limits, &fourier, N_RANDOM).ok();
+    let (enough, n_tried) = (watch.enough(RANDOM_SHARE), AtomicUsize::new(0));
+    let enough = || {
+        let enough = enough();
+        n_tried.fetch_add(usize::from(!enough), Ordering::Relaxed);
+        enough
+    };
+    let random = best_random_fourier(&model, columns, limits, &fourier, N_RANDOM, &enough).ok();
+    let n_random = n_tried.load(Ordering::Relaxed);
     fourier
         .starts
         .extend(random.iter().map(|r| r.series.clone()));
-    let n_searches = fourier.n_starts;
-    let report = |p: &idim_excitation::FourierProgress| {
-        progress.stage(format!(
-            "searching, round {} of {n_searches} starts: best {:.5}; Ctrl-C takes it",
-            p.round + 1,
-            p.best
-        ));
-    };
-    progress.stage(format!("searching from {n_searches} starts"));
-    let (found, stopped) = watched(options.time_budget, |stop| {
-        let watch = FourierWatch {
-            stop,
-            progress: &report,
-        };
-        optimise_fourier_watched(&model, &columns, limits, &fourier, &watch)
-    });
-    let design = found?;
+    let (design, stopped) = search(&model, columns, limits, &fourier, progress, watch)?;
     let weigh = |series: &FourierSeries| {
         let n_samples = 10 * fourier.n_samples;
-        let columns = (&columns, &fourier.added[..]);
+        let columns = (columns, &fourier.added[..]);
         weighted_conditioning(&model, columns, series, n_samples, &options.torque_noise)
     };
     let weighted = (!options.torque_noise.is_empty()).then(|| {
@@ -161,10 +172,56 @@ pub fn excite(
         limits: limits.clone(),
         design,
         random,
+        n_random,
         weighted,
         n_logs: logs.len(),
-        stopped,
+        log_choices,
+        stopped: match stopped {
+            Stopped::No if n_random < N_RANDOM => Stopped::OutOfTime,
+            other => other,
+        },
     })
+}
+
+/// The search, and why it ended.
+fn search(
+    model: &Model,
+    columns: &Columns,
+    limits: &Limits,
+    fourier: &FourierOptions,
+    progress: &Progress,
+    watch: &Watch,
+) -> Result<(FourierDesign, Stopped), Error> {
+    let n_searches = fourier.n_starts;
+    let report = |p: &idim_excitation::FourierProgress| {
+        progress.stage(format!(
+            "searching, round {} of {n_searches} starts: best {:.5}; Ctrl-C takes it",
+            p.round + 1,
+            p.best
+        ));
+    };
+    progress.stage(format!("searching from {n_searches} starts"));
+    let (found, stopped) = watch.run(|stop| {
+        let watch = FourierWatch {
+            stop,
+            progress: &report,
+        };
+        optimise_fourier_watched(model, columns, limits, fourier, &watch)
+    });
+    match (found, stopped) {
+        (Ok(design), stopped) => Ok((design, stopped)),
+        (Err(idim_excitation::Error::NoFeasibleMotion { .. }), Stopped::Interrupted) => {
+            Err(Error::Interrupted)
+        }
+        (Err(idim_excitation::Error::NoFeasibleMotion { .. }), Stopped::OutOfTime) => {
+            Err(Error::input(
+                "--time-budget",
+                "used up before any motion was certified",
+                "nothing is written; give more time, or leave it out",
+            ))
+        }
+        (Err(error), _) => Err(error.into()),
+    }
 }
 
 fn fourier_options(options: &ExciteOptions) -> FourierOptions {

@@ -105,11 +105,7 @@ pub fn identify(
     } else {
         (training, validation)
     };
-    let plan = SamplingPlan::new(&training, &options.sampling);
-    let at_first = all_stretches(&training, &plan)?;
-    let plan = with_own_dead_band(robot, plan, &at_first, options);
-    drop(at_first);
-    let Sampling { plan, cutoff } = choose_sampling(robot, &training, plan, options)?;
+    let Sampling { plan, cutoff } = sampling(robot, &training, options)?;
     let (mut train, clocks) = stated_stretches(&training, &plan)?;
     let (mut held_out, held_out_clocks) = stated_stretches(&validation, &plan)?;
     let mut conditioning = clocks;
@@ -178,6 +174,19 @@ pub fn identify(
         plan,
         load,
     })
+}
+
+/// How the logs become samples: everything that the options leave open is chosen from the data.
+pub(crate) fn sampling(
+    robot: &Robot,
+    training: &[Measurements],
+    options: &IdentifyOptions,
+) -> Result<Sampling, Error> {
+    let plan = SamplingPlan::new(training, &options.sampling);
+    let at_first = all_stretches(training, &plan)?;
+    let plan = with_own_dead_band(robot, plan, &at_first, options);
+    drop(at_first);
+    choose_sampling(robot, training, plan, options)
 }
 
 /// The first part trains, the rest validates; cut before anything is filtered, so that nothing leaks.

@@ -137,7 +137,7 @@ fn regress_rest_weights_and_a_time_budget_are_heard() {
         "--criterion",
         "d,cond-equilibrated=0.5",
     ];
-    let budget = ["--time-budget", "0.2", "--columns", "viscous"];
+    let budget = ["--time-budget", "2", "--columns", "viscous"];
     let text = bench
         .excite("out", &[&LIMITS[..], &more, &budget].concat())
         .unwrap();
@@ -230,24 +230,30 @@ fn identity_a_motion_is_designed_for_the_columns_that_identify_uses() {
     }
 }
 
-/// What the log of two slow sines tells need not be asked again.
-#[test]
-fn identity_earlier_logs_change_what_is_asked_of_the_motion() {
-    let bench = Bench::new();
-    let (mut log, n) = (String::from("t,q1,q2,qd1,qd2,qdd1,qdd2,tau1,tau2\n"), 1000);
-    for k in 0..n {
+/// The log of two slow sines, by these names of its columns; `sign` of the second velocity.
+fn sines(header: &str, sign: f64) -> String {
+    let mut log = format!("{header}\n");
+    for k in 0..1000 {
         let t = 0.01 * f64::from(k);
-        let joint = |w: f64| {
+        let joint = |w: f64, sign: f64| {
             let (s, c) = (w * t).sin_cos();
-            [s, w * c, -w * w * s, 3.0 * w * c - 2.0 * w * w * s]
+            [s, sign * w * c, -w * w * s, 3.0 * w * c - 2.0 * w * w * s]
         };
-        let (a, b) = (joint(2.0), joint(3.1));
+        let (a, b) = (joint(2.0, 1.0), joint(3.1, sign));
         let _ = write!(log, "{t}");
         for (a, b) in a.iter().zip(b) {
             let _ = write!(log, ",{a},{b}");
         }
         log.push('\n');
     }
+    log
+}
+
+/// What the log of two slow sines tells need not be asked again.
+#[test]
+fn identity_earlier_logs_change_what_is_asked_of_the_motion() {
+    let bench = Bench::new();
+    let log = sines("t,q1,q2,qd1,qd2,qdd1,qdd2,tau1,tau2", 1.0);
     std::fs::write(bench.path("log.csv"), log).unwrap();
     let path = bench.path("log.csv");
     let given = ["--log", path.to_str().unwrap(), "--criterion", "d"];
@@ -255,6 +261,9 @@ fn identity_earlier_logs_change_what_is_asked_of_the_motion() {
         .excite("out", &[&LIMITS[..], &given].concat())
         .unwrap();
     assert!(text.contains("1 earlier logs"), "{text}");
+    // How it became samples is that of `identify`, and said.
+    assert!(text.contains("whose error on held-out blocks"), "{text}");
+    assert!(text.contains("dead band"), "{text}");
     let alone = bench.excite("alone", &[&LIMITS[..], &["--criterion", "d"]].concat());
     alone.unwrap();
     assert_ne!(bench.series("out"), bench.series("alone"));
@@ -265,6 +274,31 @@ fn identity_earlier_logs_change_what_is_asked_of_the_motion() {
         json["search"]["value"].as_f64().unwrap()
     };
     assert!(value("out") < value("alone"));
+}
+
+#[test]
+fn regress_earlier_logs_are_read_by_a_mapping_and_findings_can_be_waived() {
+    let bench = Bench::new();
+    let header = "t,one,two,qd1,qd2,qdd1,qdd2,tau1,tau2";
+    std::fs::write(bench.path("log.csv"), sines(header, -1.0)).unwrap();
+    let mapping = r#"(columns: [
+        (header: "one", quantity: q, joint: "1"), (header: "two", quantity: q, joint: "2"),
+    ])"#;
+    std::fs::write(bench.path("map.ron"), mapping).unwrap();
+    let (log, map) = (bench.path("log.csv"), bench.path("map.ron"));
+    let (log, map) = (log.to_str().unwrap(), map.to_str().unwrap());
+    let ask = |more: &[&str]| bench.excite("out", &[&LIMITS[..], &["--log", log], more].concat());
+    let message = ask(&[]).unwrap_err();
+    assert!(
+        message.contains("log.csv") && message.contains("one"),
+        "{message}"
+    );
+    let message = ask(&["--mapping", map]).unwrap_err();
+    assert!(message.contains("velocity-sign"), "{message}");
+    assert!(!bench.path("out").exists());
+    ask(&["--mapping", map, "--waive", "velocity-sign"]).unwrap();
+    let alone = bench.excite("alone", &[&LIMITS[..], &["--mapping", map]].concat());
+    assert!(alone.unwrap_err().contains("--log"));
 }
 
 #[test]

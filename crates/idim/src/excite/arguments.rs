@@ -2,20 +2,21 @@
 
 use super::certificate_file::certificate_json;
 use super::conditions::conditions;
+use super::interrupt::Watch;
 use super::limits::{GivenLimits, for_joints, motion_limits};
 use super::text::excitation_text;
-use super::{Excitation, ExciteOptions, excite};
+use super::{Excitation, ExciteOptions, excite_watched};
+use crate::check::Waiver;
 use crate::cli::{Column, RobotChanges, drive_columns, file_name, load, say};
 use crate::error::Error;
 use crate::log_spec::LogSpec;
-use crate::logs::read_logs;
+use crate::logs::{read_logs, read_mapping};
 use crate::output::write_atomically;
 use crate::plots;
 use crate::progress::Progress;
 use crate::report::warnings_text;
 use clap::Args;
 use idim_excitation::{Criterion, Scaling};
-use idim_measurement::ColumnMapping;
 use idim_model::{JointStates, Robot};
 use idim_trajectory::{FourierSeries, Motion, TrajectoryFile};
 use std::fmt::Write as _;
@@ -32,7 +33,7 @@ pub struct ExciteArgs {
     /// cond,d=0.1 (weights of the logarithms).
     #[arg(long, value_name = "NAME[=WEIGHT]", value_delimiter = ',', value_parser = parse_term, default_value = "cond")]
     pub criterion: Vec<CriterionTerm>,
-    /// Search for this long, s; the result then depends on the machine.
+    /// Take this long from the start of the command, s; the result then depends on the machine.
     #[arg(long, value_name = "S")]
     pub time_budget: Option<f64>,
     /// Period of the motion, s.
@@ -85,6 +86,12 @@ pub struct ExciteArgs {
     /// Earlier log whose information counts: the motion becomes its best complement; may be repeated.
     #[arg(long, value_name = "LOG", num_args = 1.., value_parser = LogSpec::parse)]
     pub log: Vec<LogSpec>,
+    /// Which column of the logs holds what, where the header does not say so (docs/logs.md).
+    #[arg(long, alias = "map", value_name = "FILE", requires = "log")]
+    pub mapping: Option<PathBuf>,
+    /// Accept a finding of the log doctor by name, of all joints or of one; may be repeated.
+    #[arg(long, value_name = "CODE[:JOINT]", requires = "log")]
+    pub waive: Vec<Waiver>,
     /// Folder for results: DIR/ROBOT/motion.ron and others.
     #[arg(long, value_name = "DIR", default_value = "idim-out")]
     pub out: PathBuf,
@@ -148,6 +155,7 @@ fn parse_pair(text: &str) -> Result<(String, String), String> {
 /// Designs a motion and writes it.
 pub(crate) fn run_excite(args: &ExciteArgs, out: &mut dyn Write) -> Result<(), Error> {
     check(args)?;
+    let watch = Watch::begin(args.time_budget);
     let progress = Progress::new();
     progress.stage("reading");
     let loaded = load(&args.robot, &args.changes)?;
@@ -159,7 +167,8 @@ pub(crate) fn run_excite(args: &ExciteArgs, out: &mut dyn Write) -> Result<(), E
     };
     let limits = motion_limits(robot, &given)?;
     let noise = for_joints("--noise", &args.noise, robot.n_joints())?;
-    let logs = read_logs(&args.log, &loaded, &ColumnMapping::default(), &[])?;
+    let mapping = read_mapping(args.mapping.as_ref())?;
+    let logs = read_logs(&args.log, &loaded, &mapping, &args.waive)?;
     let conditions = conditions(robot, args.torque_share, args.clearance, &args.may_touch)?;
     let options = ExciteOptions {
         criteria: args
@@ -179,7 +188,9 @@ pub(crate) fn run_excite(args: &ExciteArgs, out: &mut dyn Write) -> Result<(), E
         clearance: conditions.clearance,
         time_budget: args.time_budget,
     };
-    let found = excite(robot, &limits, &logs.measurements, &options, &progress)?;
+    watch.check()?;
+    let logs_read = &logs.measurements;
+    let found = excite_watched(robot, &limits, logs_read, &options, &progress, &watch)?;
     progress.stage("drawing");
     let files = files(robot, &found, args.rate);
     progress.finish();

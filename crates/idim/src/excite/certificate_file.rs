@@ -57,6 +57,7 @@ pub(super) fn certificate_json(robot: &Robot, found: &Excitation) -> Value {
         "search": {
             "criterion": criterion_name(found),
             "value": found.value(),
+            "random_motions": found.n_random,
             "best_random": found.random.as_ref().map(super::lowest),
             "seed": o.seed,
             "starts": o.n_starts,
@@ -64,6 +65,7 @@ pub(super) fn certificate_json(robot: &Robot, found: &Excitation) -> Value {
             "searches": d.values.len(),
             "evaluations": d.n_evaluations,
             "earlier_logs": found.n_logs,
+            "log_choices": found.log_choices,
             "condition_by": "information matrix",
             "condition_rounding": rounding_of_search(found),
             "time_budget": o.time_budget,

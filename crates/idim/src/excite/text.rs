@@ -25,6 +25,9 @@ pub(super) fn excitation_text(robot: &Robot, found: &Excitation) -> String {
             "beside what {} earlier logs tell: information of their time over that of one period",
             found.n_logs
         );
+        for choice in &found.log_choices {
+            let _ = writeln!(out, "  {choice}");
+        }
     }
     out += &search_text(found);
     let _ = writeln!(
@@ -32,7 +35,7 @@ pub(super) fn excitation_text(robot: &Robot, found: &Excitation) -> String {
         "lowered: {}; reached {}, best of {} random motions {}",
         criterion_name(found),
         number(found.value()),
-        super::N_RANDOM,
+        found.n_random,
         found.random.as_ref().map_or_else(
             || "none inside the limits".into(),
             |r| number(super::lowest(r))
