@@ -124,6 +124,7 @@ fn by_reflections(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dual::{AGREEMENT, Dual, Extremes, dual, gram, logarithm, torque_rows};
     use crate::{Criterion, Scaling};
     use idim_model::ParameterKind::{Fv, MX, MY, XX, ZZ};
     use idim_model::{DriveColumns, Parameter, observation_matrix, random_states};
@@ -180,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn identity_gradient_of_log_condition_by_differences() {
+    fn identity_gradient_of_log_condition_by_dual_numbers() {
         let robot = idim_model::robot_from_ron(idim_fixtures::PUMA3R).expect("a fixture");
         let model = Model::new(&robot);
         let column = |(kind, index)| Parameter { kind, index };
@@ -212,24 +213,22 @@ mod tests {
                     + gradient.qdd(j)[k] * direction.qdd(j)[k];
             }
         }
-        let moved = |t: f64| {
-            let mut s = states.clone();
-            for j in 0..3 {
-                for k in 0..21 {
-                    s.q_mut(j)[k] += t * direction.q(j)[k];
-                    s.qd_mut(j)[k] += t * direction.qd(j)[k];
-                    s.qdd_mut(j)[k] += t * direction.qdd(j)[k];
-                }
-            }
-            condition_number(&model, &columns, &s, &weights).value.ln()
-        };
-        // Six points: truncation h⁶ = 1e-18 times the seventh derivative, rounding 1e-15 / h = 1e-12.
-        let h = 1e-3;
-        let odd = |k: f64| moved(k * h) - moved(-k * h);
-        let numeric = (45.0 * odd(1.0) - 9.0 * odd(2.0) + odd(3.0)) / (60.0 * h);
+        let mut rows = Vec::new();
+        for k in 0..21 {
+            let (at, by) = (states.state(k), direction.state(k));
+            let both = |at: &[f64], by: &[f64]| -> Vec<Dual> {
+                at.iter().zip(by).map(|(x, d)| dual(*x, *d)).collect()
+            };
+            let [q, qd, qdd] =
+                [(&at.q, &by.q), (&at.qd, &by.qd), (&at.qdd, &by.qdd)].map(|(at, by)| both(at, by));
+            let here = torque_rows(&robot, (&columns, &[]), [&q, &qd, &qdd]);
+            rows.extend(weights.into_iter().zip(here));
+        }
+        let criterion = Criterion::TwoNorm(Scaling::Raw);
+        let expected = logarithm(criterion, Extremes::Sharp, gram(&rows), 21);
         assert!(
-            (slope - numeric).abs() < 1e-9 * slope.abs().max(1.0),
-            "{slope} {numeric}"
+            (slope - expected.du).abs() < AGREEMENT * slope.abs().max(1.0),
+            "{slope} {expected:?}"
         );
     }
 

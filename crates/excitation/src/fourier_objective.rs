@@ -136,7 +136,10 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use super::*;
-    use crate::{Criterion, Scaling};
+    use crate::Criterion;
+    use crate::dual::{
+        AGREEMENT, Dual, Extremes, SMOOTH, SPRING, dual, gram, logarithm, torque_rows,
+    };
     use idim_model::{KnownTorque, ParameterKind, robot_from_ron};
     use idim_trajectory::{Limits, random_series};
     use proptest::prelude::*;
@@ -177,7 +180,7 @@ mod tests {
             kind,
             turns: vec![0.0, 0.7, 1.0],
         };
-        let spring = KnownTorque::from_formula("spring", 1, &[], "sin(q) * sqrt(1.5 - cos(q))");
+        let spring = KnownTorque::from_formula("spring", 1, &[], SPRING);
         vec![
             motor(ParameterKind::Ia),
             motor(ParameterKind::Fv),
@@ -224,8 +227,28 @@ mod tests {
         assert!((found - expected).norm_max() < 1e-13 * scale);
     }
 
+    /// States of a series whose coefficients move in a direction: joint by joint `q₀, a₁ .. a₃, b₁ .. b₃` as `coefficients` has them.
+    fn dual_states(c: &[Dual], omega: f64, t: f64) -> [Vec<Dual>; 3] {
+        let mut states = [vec![], vec![], vec![]];
+        for c in c.chunks_exact(7) {
+            let (mut q, mut qd, mut qdd) = (c[0], Dual::ZERO, Dual::ZERO);
+            for l in 1..=3 {
+                let (a, b) = (c[l], c[3 + l]);
+                let w = omega * l as f64;
+                let (s, k) = (w * t).sin_cos();
+                q = q + a * (s / w) - b * (k / w);
+                qd = qd + a * k + b * s;
+                qdd = qdd + b * (w * k) - a * (w * s);
+            }
+            for (to, value) in states.iter_mut().zip([q, qd, qdd]) {
+                to.push(value);
+            }
+        }
+        states
+    }
+
     proptest! {
-        #![proptest_config(ProptestConfig::with_cases(12))]
+        #![proptest_config(ProptestConfig::with_cases(8))]
 
         #[test]
         fn identity_the_gradient_is_the_slope_in_any_direction(
@@ -233,52 +256,56 @@ mod tests {
             direction in prop::collection::vec(-1.0..1.0_f64, 21),
             plain in proptest::bool::ANY,
         ) {
-            let model = Model::new(&robot_from_ron(idim_fixtures::PUMA3R).unwrap());
-            let columns = columns();
+            let robot = robot_from_ron(idim_fixtures::PUMA3R).unwrap();
+            let (model, columns) = (Model::new(&robot), columns());
             let limits = Limits {
                 position: vec![[-2.0, 1.0]; 3],
                 velocity: vec![2.0; 3],
                 acceleration: vec![6.0; 3],
             };
-            let noise = if plain { vec![] } else { vec![0.5, 2.0, 1.0] };
+            let noise = if plain { vec![1.0; 3] } else { vec![0.5, 2.0, 1.0] };
             let added = if plain { vec![] } else { added() };
-            let prior = Mat::<f64>::identity(17 + added.len(), 17 + added.len());
+            let p = 17 + added.len();
+            // Not a whole number of blocks.
+            let n_samples = 45;
             let options = FourierOptions {
                 period: 7.0,
                 n_harmonics: 3,
-                // Not a whole number of blocks.
-                n_samples: 45,
-                torque_noise: noise,
-                added,
-                prior_information: (!plain).then_some(prior),
+                n_samples,
+                torque_noise: noise.clone(),
+                added: added.clone(),
+                prior_information: (!plain).then(|| Mat::<f64>::identity(p, p)),
                 ..FourierOptions::default()
             };
-            let c = random_series(&limits, 3, 7.0, seed).coefficients();
-            let moved = |t: f64| -> Vec<f64> {
-                c.iter().zip(&direction).map(|(c, d)| c + t * d).collect()
-            };
-            for criterion in [
-                Criterion::TwoNorm(Scaling::Raw),
-                Criterion::TwoNorm(Scaling::Equilibrated),
-                Criterion::LogDet,
-                Criterion::TraceInverse,
-                Criterion::WorstDirection,
-            ] {
-                let smooth = SmoothCriterion::new(criterion).unwrap();
-                let criteria = [(0.7, smooth), (0.1, SmoothCriterion::new(Criterion::LogDet).unwrap())];
-                let mut objective = FourierObjective::new(&model, &columns, &criteria, &options);
-                // Without crossings of extreme eigenvalues.
-                objective.smooth(Some(3.0));
-                let mut f = |t: f64| objective.value(&moved(t));
-                // Five-point difference: truncation h⁴ times some thousand, rounding 1e-16 cond(A) / h.
-                let h = 5e-4;
-                let numeric = (8.0 * (f(h) - f(-h)) - (f(2.0 * h) - f(-2.0 * h))) / (12.0 * h);
-                f(0.0);
-                let exact = crate::dense::dot(&objective.gradient(), &direction);
-                prop_assert!(
-                    (exact - numeric).abs() < 1e-8 * exact.abs().max(1.0),
-                    "{:?}: {} against {}", criterion, exact, numeric
-                );
+            let series = random_series(&limits, 3, 7.0, seed);
+            let c = series.coefficients();
+            let moved: Vec<Dual> = c.iter().zip(&direction).map(|(c, d)| dual(*c, *d)).collect();
+            let mut rows = Vec::new();
+            for k in 0..n_samples {
+                let t = 7.0 * k as f64 / n_samples as f64;
+                let [q, qd, qdd] = dual_states(&moved, series.omega(), t);
+                let here = torque_rows(&robot, (&columns, &added), [&q, &qd, &qdd]);
+                rows.extend(here.into_iter().enumerate().map(|(j, row)| (noise[j].powi(-2), row)));
+            }
+            let mut a = gram(&rows);
+            for (i, row) in a.iter_mut().enumerate().filter(|_| !plain) {
+                row[i] = row[i] + dual(n_samples as f64, 0.0);
+            }
+            for criterion in SMOOTH {
+                for (power, extremes) in [(None, Extremes::Sharp), (Some(3.0), Extremes::Norm(3.0))] {
+                    let weighted = [(0.7, criterion), (0.1, Criterion::LogDet)];
+                    let expected = weighted.map(|(w, c)| logarithm(c, extremes, a.clone(), n_samples) * w);
+                    let expected = expected[0] + expected[1];
+                    let smooth = weighted.map(|(w, c)| (w, SmoothCriterion::new(c).unwrap()));
+                    let mut objective = FourierObjective::new(&model, &columns, &smooth, &options);
+                    objective.smooth(power);
+                    let value = objective.value(&c);
+                    let slope = crate::dense::dot(&objective.gradient(), &direction);
+                    prop_assert!(
+                        (value - expected.re).abs() < AGREEMENT && (slope - expected.du).abs() < AGREEMENT * slope.abs().max(1.0),
+                        "{criterion:?}, {extremes:?}: {value}, {slope} against {expected:?}"
+                    );
+                }
             }
         }
     }

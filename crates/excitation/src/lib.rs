@@ -36,6 +36,8 @@ mod clearance;
 mod condition;
 mod criterion;
 mod dense;
+#[cfg(test)]
+mod dual;
 mod eigenvalues;
 mod energy;
 mod energy_gradient;

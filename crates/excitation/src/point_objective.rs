@@ -229,12 +229,12 @@ mod tests {
 
     use super::*;
     use crate::PointLimits;
+    use crate::dual::{AGREEMENT, Dual, Extremes, SMOOTH, dual, energy_row, gram, logarithm};
     use idim_model::{Columns, Parameter, ParameterKind as K, robot_from_ron};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    fn design() -> EnergyDesign {
-        let robot = robot_from_ron(idim_fixtures::PLANAR2R).unwrap();
+    fn columns() -> Columns {
         let column = |(kind, index)| Parameter { kind, index };
         let base = [
             (K::ZZ, 0),
@@ -244,11 +244,16 @@ mod tests {
             (K::MX, 1),
             (K::MY, 1),
         ];
+        Columns(base.map(column).to_vec())
+    }
+
+    fn design() -> EnergyDesign {
+        let robot = robot_from_ron(idim_fixtures::PLANAR2R).unwrap();
         let limits = PointLimits {
             position: vec![[-1.0, 1.2]; 2],
             velocity: vec![2.0, 1.5],
         };
-        EnergyDesign::new(&robot, &Columns(base.map(column).to_vec()), limits).unwrap()
+        EnergyDesign::new(&robot, &columns(), limits).unwrap()
     }
 
     #[test]
@@ -291,6 +296,60 @@ mod tests {
             assert!(
                 (slope - numeric).abs() < 1e-9 * slope.abs().max(1.0),
                 "{criterion:?}, S limited: {limit:?}: {slope} {numeric}"
+            );
+        }
+    }
+
+    #[test]
+    fn identity_gradient_of_every_criterion_by_dual_numbers() {
+        let robot = robot_from_ron(idim_fixtures::PLANAR2R).unwrap();
+        let (design, columns) = (design(), columns());
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let (n, n_rows) = (design.n_variables(), 9);
+        let positions = design.position_variables();
+        let ranges: Vec<[f64; 2]> = design.ranges().collect();
+        let x: Vec<f64> = (0..n * (n_rows + 1))
+            .map(|_| rng.random_range(-0.9..0.9))
+            .collect();
+        let direction: Vec<f64> = x.iter().map(|_| rng.random_range(-1.0..1.0)).collect();
+        let energies: Vec<Vec<Dual>> = (0..=n_rows)
+            .map(|point| {
+                let (mut q, mut qd) = (vec![Dual::ZERO; 2], vec![Dual::ZERO; 2]);
+                for (k, [low, high]) in ranges.iter().enumerate() {
+                    let i = point * n + k;
+                    let value = dual(x[i], direction[i]) * (0.5 * (high - low));
+                    let value = value + dual(0.5 * (high + low), 0.0);
+                    match positions.get(k) {
+                        Some(&j) => q[j] = value,
+                        None => qd[k - positions.len()] = value,
+                    }
+                }
+                energy_row(&robot, &columns, &q, &qd)
+            })
+            .collect();
+        let rows = energies.windows(2).map(|e| {
+            let difference = e[1].iter().zip(&e[0]).map(|(b, a)| *b - *a);
+            (1.0, difference.collect())
+        });
+        let a = gram(&rows.collect::<Vec<_>>());
+        for criterion in SMOOTH {
+            let extremes = match criterion {
+                Criterion::TwoNorm(Scaling::Raw) => Extremes::Traces(8.0),
+                _ => Extremes::Norm(8.0),
+            };
+            let expected = logarithm(criterion, extremes, a.clone(), n_rows);
+            let mut objective = PointObjective::new(&design, n_rows, criterion, None).unwrap();
+            let mut gradient = vec![0.0; x.len()];
+            let value = objective.value_and_gradient(&x, 3, &mut gradient);
+            let slope = crate::dense::dot(&gradient, &direction);
+            assert!(
+                (value - expected.re).abs() < AGREEMENT,
+                "{criterion:?}: {value} {expected:?}"
+            );
+            let error = (slope - expected.du).abs();
+            assert!(
+                error < AGREEMENT * slope.abs().max(1.0),
+                "{criterion:?}: {slope} {expected:?}"
             );
         }
     }
