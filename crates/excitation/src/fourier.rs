@@ -6,7 +6,7 @@ use crate::fourier_search::Task;
 use crate::{
     AddedColumn, ClearanceCertificate, Conditioning, Error, FourierOptions, TorqueCertificate,
 };
-use idim_model::{Columns, Model};
+use idim_model::{Columns, JointStates, Model};
 use idim_trajectory::{Certificate, FourierSeries, Limits};
 use std::sync::atomic::AtomicBool;
 
@@ -179,11 +179,30 @@ pub fn weighted_conditioning(
     n_samples: usize,
     torque_noise: &[f64],
 ) -> Conditioning {
+    states_conditioning(
+        model,
+        (columns, added),
+        &series.equispaced_states(n_samples),
+        torque_noise,
+    )
+}
+
+/// Every criterion of the torque rows at these states, the columns beside the regressor's last, divided by the standard
+/// deviation of their joint's torque, N·m.
+///
+/// # Panics
+/// As [`weighted_conditioning`].
+#[track_caller]
+pub fn states_conditioning(
+    model: &Model,
+    (columns, added): (&Columns, &[AddedColumn]),
+    states: &JointStates,
+    torque_noise: &[f64],
+) -> Conditioning {
     let n = model.n_joints();
     assert_eq!(torque_noise.len(), n, "one standard deviation per joint");
-    let states = series.equispaced_states(n_samples);
-    let y = idim_model::observation_matrix(model, columns, &states);
-    let (x, p) = (AddedRows::new(added, &states), columns.len());
+    let y = idim_model::observation_matrix(model, columns, states);
+    let (x, p) = (AddedRows::new(added, states), columns.len());
     let w = faer::Mat::from_fn(y.nrows(), p + added.len(), |row, column| {
         let (sample, joint) = (row / n, row % n);
         let entry = if column < p {
@@ -193,5 +212,5 @@ pub fn weighted_conditioning(
         };
         entry / torque_noise[joint]
     });
-    Conditioning::of_rows(w.as_ref(), n_samples)
+    Conditioning::of_rows(w.as_ref(), states.n_samples())
 }

@@ -79,7 +79,7 @@ pub use criterion::{ConditionNumbers, Conditioning, Criterion, Equilibrium, Scal
 pub use error::Error;
 pub use fourier::{
     FourierDesign, FourierProgress, FourierWatch, best_random_fourier, optimise_fourier,
-    optimise_fourier_watched, series_conditioning, weighted_conditioning,
+    optimise_fourier_watched, series_conditioning, states_conditioning, weighted_conditioning,
 };
 pub use fourier_options::{FourierEnds, FourierOptions};
 pub use information::{information_matrix, information_with_observations};

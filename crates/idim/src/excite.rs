@@ -3,13 +3,16 @@
 mod arguments;
 mod certificate_file;
 mod conditions;
+mod files;
 mod interrupt;
 mod limits;
+pub(crate) mod points;
+mod points_text;
 mod prior;
 mod text;
 
 pub(crate) use arguments::run_excite;
-pub use arguments::{CriterionTerm, ExciteArgs};
+pub use arguments::{CriterionTerm, ExciteArgs, Family};
 pub(crate) use interrupt::INTERRUPTED_CODE;
 
 use crate::columns::ExtraColumn;

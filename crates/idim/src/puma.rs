@@ -5,6 +5,7 @@ mod tables;
 
 use crate::cli::NamedText;
 use crate::error::Error;
+use crate::excite::points::path_through;
 use crate::identify::{Prediction, errors, joint_names};
 use crate::noise_study::noise_study;
 use crate::papers::gautier_khalil;
@@ -19,7 +20,7 @@ use idim_excitation::{
     PowellPointOptions, Scaling, optimise_points_powell, random_condition_statistics,
 };
 use idim_model::{JointStates, Robot, robot_from_ron};
-use idim_trajectory::{Certificate, Limits, PathPoint, QuinticPath};
+use idim_trajectory::{Certificate, Limits, QuinticPath};
 
 /// Numbers of equations of table 2 (inferred).
 const TABLE2_ROWS: [usize; 8] = [15, 20, 30, 50, 100, 250, 500, 1000];
@@ -190,7 +191,8 @@ fn exciting_motion(
             },
         };
         let points = optimise_points_powell(&design, &options);
-        let path = path_through(&points.points, path_limits)?;
+        let home = vec![0.0; robot.n_joints()];
+        let path = path_through(&points.points, &home, path_limits)?;
         let certificate = path.certificate(path_limits);
         if certificate.certified || attempts == ATTEMPTS {
             return Ok(Motion {
@@ -211,18 +213,6 @@ fn exciting_motion(
             }
         }
     }
-}
-
-/// From rest at zero through the points and back to rest at zero.
-fn path_through(points: &JointStates, limits: &Limits) -> Result<QuinticPath, Error> {
-    let home = PathPoint::at_rest(&vec![0.0; points.n_joints()]);
-    let mut all = vec![home.clone()];
-    all.extend((0..points.n_samples()).map(|k| {
-        let s = points.state(k);
-        PathPoint { q: s.q, qd: s.qd }
-    }));
-    all.push(home);
-    Ok(QuinticPath::shortest(&all, limits)?)
 }
 
 /// The random sequence, of the first thousand, whose condition number is nearest to the paper's random example.

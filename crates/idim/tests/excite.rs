@@ -2,8 +2,10 @@
 #![allow(clippy::unwrap_used)]
 
 use clap::Parser;
-use idim::Structure;
-use idim_model::{Columns, DriveColumns, JointState, Model, observation_matrix, robot_from_ron};
+use idim::{KeepOrder, Structure};
+use idim_model::{
+    Columns, DriveColumns, JointState, Model, energy_regressor, observation_matrix, robot_from_ron,
+};
 use idim_trajectory::{FourierSeries, Limits, Motion, TrajectoryFile};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -299,6 +301,87 @@ fn regress_earlier_logs_are_read_by_a_mapping_and_findings_can_be_waived() {
     ask(&["--mapping", map, "--waive", "velocity-sign"]).unwrap();
     let alone = bench.excite("alone", &[&LIMITS[..], &["--mapping", map]].concat());
     assert!(alone.unwrap_err().contains("--log"));
+}
+
+#[test]
+fn identity_exciting_points_and_a_certified_path_through_them() {
+    let bench = Bench::new();
+    let robot = bench.path("arm.ron");
+    let ask = |out: &str, more: &[&str]| {
+        let out = bench.path(out);
+        let files = [
+            "--robot",
+            robot.to_str().unwrap(),
+            "--out",
+            out.to_str().unwrap(),
+        ];
+        let points = ["--family", "points", "--starts", "2", "--rounds", "1"];
+        run(&[&files[..], &points, &LIMITS, more].concat())
+    };
+    let text = ask("out", &["--largest-s", "60"]).unwrap();
+    for word in [
+        "exciting points",
+        "S at most 60: held",
+        "best of 1000 random chains",
+        "along the path",
+    ] {
+        assert!(text.contains(word), "`{word}` is not in: {text}");
+    }
+    let file = TrajectoryFile::from_ron(&bench.file("out", "motion.ron")).unwrap();
+    let Motion::Quintic(path) = file.motion().unwrap() else {
+        panic!("not a path")
+    };
+    let limits = Limits::new(vec![[-1.2, 1.2]; 2], vec![2.0, 3.0], vec![8.0; 2]).unwrap();
+    assert!(path.certificate(&limits).certified);
+    // Twice as many energy differences as base parameters, and the way from home and back.
+    assert_eq!(path.n_segments(), 2 * 6 + 2);
+    let n = path.point_times().len();
+    let points = path.states(&path.point_times()[1..n - 1]);
+    let robot = robot_from_ron(idim_fixtures::PLANAR2R).unwrap();
+    let structure = Structure::of_energy(&robot, KeepOrder::Links);
+    let (model, columns) = (Model::new(&robot), structure.base_columns());
+    let h = |k: usize| {
+        let s = points.state(k);
+        energy_regressor(&model, &columns, &s.q, &s.qd)
+    };
+    let w = faer::Mat::from_fn(12, 6, |i, j| h(i + 1)[j] - h(i)[j]);
+    let sigma = w.singular_values().unwrap();
+    let certificate: serde_json::Value =
+        serde_json::from_str(&bench.file("out", "certificate.json")).unwrap();
+    assert_eq!(certificate["certified"], true);
+    let found = certificate["criteria"]["condition_number"]["raw"]
+        .as_f64()
+        .unwrap();
+    // Points are read back from the polynomials between them.
+    assert!(
+        (found / (sigma[0] / sigma[5]) - 1.0).abs() < 1e-6,
+        "{found}"
+    );
+    let search = &certificate["search"];
+    assert_eq!(search["value"].as_f64().unwrap(), found);
+    assert!(found < search["best_random"].as_f64().unwrap());
+    assert_eq!(search["reproducible"], true);
+    ask("again", &["--largest-s", "60"]).unwrap();
+    assert_eq!(
+        bench.file("again", "motion.json"),
+        bench.file("out", "motion.json")
+    );
+    // What belongs to the other family is not dropped in silence.
+    let refused = |more: &[&str], words: &[&str]| {
+        let message = ask("refused", more).unwrap_err();
+        for word in words {
+            assert!(message.contains(word), "`{word}` is not in: {message}");
+        }
+    };
+    refused(&["--harmonics", "3"], &["--harmonics", "points"]);
+    refused(&["--log", "log.csv"], &["--log"]);
+    refused(&["--torque-share", "0.5"], &["--torque-share"]);
+    refused(&["--rows", "5"], &["5", "6 base columns"]);
+    refused(&["--criterion", "d,e"], &["by one"]);
+    refused(&["--largest-s", "1"], &["limit of S"]);
+    let message = bench.excite("refused", &[&LIMITS[..], &["--rows", "20"]].concat());
+    assert!(message.unwrap_err().contains("--rows"));
+    assert!(!bench.path("refused").exists());
 }
 
 #[test]

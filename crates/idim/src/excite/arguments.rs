@@ -2,26 +2,28 @@
 
 use super::certificate_file::certificate_json;
 use super::conditions::conditions;
+use super::files::{files, write};
 use super::interrupt::Watch;
 use super::limits::{GivenLimits, for_joints, motion_limits};
+use super::points::{PointOptions, excite_points};
+use super::points_text::{points_json, points_text};
 use super::text::excitation_text;
-use super::{Excitation, ExciteOptions, excite_watched};
+use super::{ExciteOptions, excite_watched};
 use crate::check::Waiver;
-use crate::cli::{Column, RobotChanges, drive_columns, file_name, load, say};
+use crate::cli::{Column, RobotChanges, drive_columns, load, say};
 use crate::error::Error;
+use crate::load::LoadedRobot;
 use crate::log_spec::LogSpec;
 use crate::logs::{read_logs, read_mapping};
-use crate::output::write_atomically;
 use crate::plots;
 use crate::progress::Progress;
 use crate::report::warnings_text;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use idim_excitation::{Criterion, Scaling};
-use idim_model::{JointStates, Robot};
-use idim_trajectory::{FourierSeries, Motion, TrajectoryFile};
-use std::fmt::Write as _;
+use idim_model::Robot;
+use idim_trajectory::{Limits, Motion};
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `excite`.
 #[derive(Debug, Clone, Args)]
@@ -29,6 +31,9 @@ pub struct ExciteArgs {
     /// Robot file, .ron or .urdf.
     #[arg(long, value_name = "FILE")]
     pub robot: PathBuf,
+    /// A periodic motion, or points of the energy model with a path through them (Gautier & Khalil 1991).
+    #[arg(long, value_enum, default_value_t = Family::Fourier)]
+    pub family: Family,
     /// What to lower: cond, cond-equilibrated, frobenius, frobenius-equilibrated, d, a, e; several with weights as
     /// cond,d=0.1 (weights of the logarithms).
     #[arg(long, value_name = "NAME[=WEIGHT]", value_delimiter = ',', value_parser = parse_term, default_value = "cond")]
@@ -36,16 +41,23 @@ pub struct ExciteArgs {
     /// Take this long from the start of the command, s; the result then depends on the machine.
     #[arg(long, value_name = "S")]
     pub time_budget: Option<f64>,
-    /// Period of the motion, s.
-    #[arg(long, value_name = "S", default_value_t = 10.0)]
-    pub period: f64,
-    /// Harmonics of every joint.
-    #[arg(long, value_name = "N", default_value_t = 5)]
-    pub harmonics: usize,
-    /// Searches of a round.
-    #[arg(long, value_name = "N", default_value_t = 8)]
-    pub starts: usize,
-    /// Rounds of searches from beside the best, after the first (default: 2, with a time budget as many as it allows).
+    /// Period of the motion, s (default: 10).
+    #[arg(long, value_name = "S")]
+    pub period: Option<f64>,
+    /// Harmonics of every joint (default: 5).
+    #[arg(long, value_name = "N")]
+    pub harmonics: Option<usize>,
+    /// Energy differences between points (default: twice the base parameters).
+    #[arg(long, value_name = "N")]
+    pub rows: Option<usize>,
+    /// Largest S = max |W| / min |W| of points (default: any; 175 in the paper).
+    #[arg(long, value_name = "S")]
+    pub largest_s: Option<f64>,
+    /// Searches of a round (default: 8); random starts of points (default: 32, with a time budget 10).
+    #[arg(long, value_name = "N")]
+    pub starts: Option<usize>,
+    /// Rounds of searches from beside the best, after the first (default: 2, with a time budget as many as it allows; of
+    /// points 12, with a time budget as many as it allows, with --largest-s at most 48).
     #[arg(long, value_name = "N")]
     pub rounds: Option<usize>,
     /// Seed of everything random.
@@ -98,6 +110,15 @@ pub struct ExciteArgs {
     /// Changes to the robot.
     #[command(flatten)]
     pub changes: RobotChanges,
+}
+
+/// Families of motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Family {
+    /// A finite Fourier series for the torque model.
+    Fourier,
+    /// Points (q, qd) for the energy model, and a path of fifth-order polynomials through them.
+    Points,
 }
 
 /// A criterion and its weight.
@@ -166,9 +187,23 @@ pub(crate) fn run_excite(args: &ExciteArgs, out: &mut dyn Write) -> Result<(), E
         acceleration: &args.acceleration,
     };
     let limits = motion_limits(robot, &given)?;
+    match args.family {
+        Family::Fourier => run_fourier(args, &loaded, &limits, (&progress, &watch), out),
+        Family::Points => run_points(args, robot, &limits, (&progress, &watch), out),
+    }
+}
+
+fn run_fourier(
+    args: &ExciteArgs,
+    loaded: &LoadedRobot,
+    limits: &Limits,
+    (progress, watch): (&Progress, &Watch),
+    out: &mut dyn Write,
+) -> Result<(), Error> {
+    let robot = &loaded.robot;
     let noise = for_joints("--noise", &args.noise, robot.n_joints())?;
     let mapping = read_mapping(args.mapping.as_ref())?;
-    let logs = read_logs(&args.log, &loaded, &mapping, &args.waive)?;
+    let logs = read_logs(&args.log, loaded, &mapping, &args.waive)?;
     let conditions = conditions(robot, args.torque_share, args.clearance, &args.may_touch)?;
     let options = ExciteOptions {
         criteria: args
@@ -176,9 +211,9 @@ pub(crate) fn run_excite(args: &ExciteArgs, out: &mut dyn Write) -> Result<(), E
             .iter()
             .map(|t| (t.weight, t.criterion))
             .collect(),
-        period: args.period,
-        n_harmonics: args.harmonics,
-        n_starts: args.starts,
+        period: args.period.unwrap_or(PERIOD),
+        n_harmonics: args.harmonics.unwrap_or(HARMONICS),
+        n_starts: args.starts.unwrap_or(STARTS),
         n_rounds: args.rounds,
         seed: args.seed,
         at_rest: args.rest,
@@ -190,9 +225,16 @@ pub(crate) fn run_excite(args: &ExciteArgs, out: &mut dyn Write) -> Result<(), E
     };
     watch.check()?;
     let logs_read = &logs.measurements;
-    let found = excite_watched(robot, &limits, logs_read, &options, &progress, &watch)?;
+    let found = excite_watched(robot, limits, logs_read, &options, progress, watch)?;
     progress.stage("drawing");
-    let files = files(robot, &found, args.rate);
+    let files = files(
+        robot,
+        &Motion::Fourier(found.design.series.clone()),
+        found.design.series.period(),
+        (args.rate, args.seed),
+        &certificate_json(robot, &found),
+        plots::of_series(robot, &found.design.series, &found.limits, "motion"),
+    );
     progress.finish();
     let mut notes = robot.notes().to_vec();
     notes.extend(logs.inferred);
@@ -204,9 +246,94 @@ pub(crate) fn run_excite(args: &ExciteArgs, out: &mut dyn Write) -> Result<(), E
     write(&args.out, robot, &files, out)
 }
 
+fn run_points(
+    args: &ExciteArgs,
+    robot: &Robot,
+    limits: &Limits,
+    (progress, watch): (&Progress, &Watch),
+    out: &mut dyn Write,
+) -> Result<(), Error> {
+    let rounds = match (args.time_budget, args.largest_s) {
+        (None, _) => POINT_ROUNDS[0],
+        (Some(_), Some(_)) => POINT_ROUNDS[1],
+        (Some(_), None) => POINT_ROUNDS[2],
+    };
+    let options = PointOptions {
+        criterion: args.criterion[0].criterion,
+        n_rows: args.rows,
+        largest_s: args.largest_s,
+        n_starts: args.starts.unwrap_or(match args.time_budget {
+            None => POINT_STARTS[0],
+            Some(_) => POINT_STARTS[1],
+        }),
+        n_rounds: args.rounds.unwrap_or(rounds),
+        seed: args.seed,
+    };
+    let found = excite_points(robot, limits, options, progress, watch)?;
+    let files = files(
+        robot,
+        &Motion::Quintic(found.path.clone()),
+        found.path.duration(),
+        (args.rate, args.seed),
+        &points_json(robot, limits, &found),
+        plots::of_path(robot, &found.path, limits).remove(0),
+    );
+    progress.finish();
+    let mut notes = robot.notes().to_vec();
+    notes.push("torques and collisions of a path through points are not looked at".into());
+    say(out, &(points_text(robot, &found) + &warnings_text(&notes)))?;
+    write(&args.out, robot, &files, out)
+}
+
+/// Refuses what the family does not know: nothing that was asked for is dropped in silence.
+fn check_family(args: &ExciteArgs) -> Result<(), Error> {
+    let of_fourier = [
+        ("--period", args.period.is_some()),
+        ("--harmonics", args.harmonics.is_some()),
+        ("--rest", args.rest),
+        ("--columns", args.columns.is_some()),
+        ("--noise", !args.noise.is_empty()),
+        (
+            "--torque-share",
+            args.torque_share.is_some_and(|s| s != 0.0),
+        ),
+        ("--clearance", args.clearance.is_some()),
+        ("--may-touch", !args.may_touch.is_empty()),
+        ("--log", !args.log.is_empty()),
+    ];
+    let of_points = [
+        ("--rows", args.rows.is_some()),
+        ("--largest-s", args.largest_s.is_some()),
+    ];
+    let (strange, family): (&[(&str, bool)], _) = match args.family {
+        Family::Fourier => (&of_points, "fourier"),
+        Family::Points => (&of_fourier, "points"),
+    };
+    if let Some((option, _)) = strange.iter().find(|(_, given)| *given) {
+        return Err(Error::input(
+            *option,
+            format!("--family {family}"),
+            "it belongs to the other family; leave one of them out (docs/commands.md)",
+        ));
+    }
+    if args.family == Family::Points && args.criterion.len() > 1 {
+        return Err(Error::input(
+            "--criterion",
+            format!("{} criteria", args.criterion.len()),
+            "points are searched for by one; --largest-s limits S beside it",
+        ));
+    }
+    Ok(())
+}
+
 fn check(args: &ExciteArgs) -> Result<(), Error> {
+    check_family(args)?;
+    let (period, harmonics) = (
+        args.period.unwrap_or(PERIOD),
+        args.harmonics.unwrap_or(HARMONICS),
+    );
     let positive = [
-        ("--period", Some(args.period), "s"),
+        ("--period", Some(period), "s"),
         ("--rate", Some(args.rate), "Hz"),
         ("--time-budget", args.time_budget, "s"),
     ];
@@ -221,17 +348,17 @@ fn check(args: &ExciteArgs) -> Result<(), Error> {
             ));
         }
     }
-    if args.period * args.rate > LARGEST {
+    if period * args.rate > LARGEST {
         return Err(Error::input(
             "--rate",
-            format!("{} samples a period", args.period * args.rate),
+            format!("{} samples a period", period * args.rate),
             "take a lower rate",
         ));
     }
-    if !(1..=MOST_HARMONICS).contains(&args.harmonics) {
+    if !(1..=MOST_HARMONICS).contains(&harmonics) {
         return Err(Error::input(
             "--harmonics",
-            args.harmonics.to_string(),
+            harmonics.to_string(),
             format!("give 1 to {MOST_HARMONICS}"),
         ));
     }
@@ -242,65 +369,12 @@ fn check(args: &ExciteArgs) -> Result<(), Error> {
 const LARGEST: f64 = 1e7;
 /// More harmonics than a drive follows, and more variables than a search handles.
 const MOST_HARMONICS: usize = 50;
-
-/// Everything a design leaves behind: name and text.
-fn files(robot: &Robot, found: &Excitation, rate: f64) -> Vec<(String, String)> {
-    let names = robot.joints().iter().map(|j| j.name.clone()).collect();
-    let source = format!("idim excite, seed {}", found.options.seed);
-    let motion = Motion::Fourier(found.design.series.clone());
-    let file = TrajectoryFile::new(names, &motion, source);
-    let certificate = certificate_json(robot, found);
-    vec![
-        ("motion.ron".into(), file.to_ron()),
-        ("motion.json".into(), file.to_json()),
-        (
-            "samples.csv".into(),
-            samples_csv(&found.design.series, rate),
-        ),
-        ("certificate.json".into(), format!("{certificate:#}\n")),
-        plots::of_series(robot, &found.design.series, &found.limits, "motion"),
-    ]
-}
-
-/// One period, the first and the last instant included: `t, q1 .., qd1 .., qdd1 ..`, SI.
-fn samples_csv(series: &FourierSeries, rate: f64) -> String {
-    let n = series.n_joints();
-    // A period that is a whole number of samples but for rounding ends with one.
-    let last = (series.period() * rate * (1.0 + 1e-12)).floor() as usize;
-    let times: Vec<f64> = (0..=last).map(|k| k as f64 / rate).collect();
-    let states = series.states(&times);
-    let mut text = String::from("t");
-    for symbol in ["q", "qd", "qdd"] {
-        for j in 1..=n {
-            let _ = write!(text, ",{symbol}{j}");
-        }
-    }
-    text.push('\n');
-    for (k, t) in times.iter().enumerate() {
-        let _ = write!(text, "{t}");
-        for values in [JointStates::q, JointStates::qd, JointStates::qdd] {
-            for j in 0..n {
-                let _ = write!(text, ",{}", values(&states, j)[k]);
-            }
-        }
-        text.push('\n');
-    }
-    text
-}
-
-fn write(
-    dir: &Path,
-    robot: &Robot,
-    files: &[(String, String)],
-    out: &mut dyn Write,
-) -> Result<(), Error> {
-    let folder = dir.join(file_name(robot.name()));
-    for (name, text) in files {
-        write_atomically(&folder.join(name), text.as_bytes())?;
-    }
-    let names: Vec<&str> = files.iter().map(|f| f.0.as_str()).collect();
-    say(
-        out,
-        &format!("\nwrote {} to {}\n", names.join(", "), folder.display()),
-    )
-}
+/// Period where nothing is said, s, and harmonics: those of Radkhah, Kulić & Croft.
+const PERIOD: f64 = 10.0;
+const HARMONICS: usize = 5;
+/// Searches of a round of a Fourier motion.
+const STARTS: usize = 8;
+/// Random starts of points without a time budget, and with one, whose rounds make up for it.
+const POINT_STARTS: [usize; 2] = [32, 10];
+/// Rounds of points: without a time budget; with one and a limit of S, that a quarter of them comes before; with one alone.
+const POINT_ROUNDS: [usize; 3] = [12, 48, 1 << 20];

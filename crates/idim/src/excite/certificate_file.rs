@@ -3,49 +3,28 @@
 use super::Excitation;
 use super::interrupt::Stopped;
 use super::text::{criterion_name, rounding_of_search};
-use idim_excitation::{Conditioning, FourierDesign};
+use idim_excitation::{Conditioning, FourierDesign, TorqueCertificate};
 use idim_model::Robot;
-use idim_trajectory::LimitUse;
+use idim_trajectory::{Certificate, LimitUse, Limits};
 use serde_json::{Value, json};
 
 /// Schema of the file written here.
-const SCHEMA: &str = "idim-certificate/1";
+pub(super) const SCHEMA: &str = "idim-certificate/1";
 
 pub(super) fn certificate_json(robot: &Robot, found: &Excitation) -> Value {
     let (o, d) = (&found.options, &found.design);
-    let used = |u: &LimitUse, limit: Value| json!({ "limit": limit, "use": u.fraction, "bound": u.bound, "time": u.time });
-    let limits = &found.limits;
-    let joints = robot.joints().iter().zip(&d.certificate.joints).enumerate();
-    let joints: Vec<Value> = joints
-        .map(|(j, (joint, u))| {
-            json!({
-                "joint": joint.name,
-                "position": used(&u.position, json!(limits.position[j])),
-                "velocity": used(&u.velocity, json!(limits.velocity[j])),
-                "acceleration": used(&u.acceleration, json!(limits.acceleration[j])),
-                "torque": d.torque.as_ref().and_then(|t| t.joints[j].as_ref())
-                    .map(|u| used(u, json!(joint.limits.torque))),
-            })
-        })
-        .collect();
-    let (joint, kind, most) = d.certificate.largest();
     json!({
         "schema": SCHEMA,
         "version": env!("CARGO_PKG_VERSION"),
         "robot": robot.name(),
+        "family": "fourier",
         "period": o.period,
         "harmonics": o.n_harmonics,
         "at_rest": o.at_rest,
         "base_parameters": found.structure.base_names(),
         "certified": d.certificate.certified,
-        "largest_use": {
-            "joint": robot.joints()[joint].name,
-            "limit": format!("{kind:?}").to_lowercase(),
-            "use": most.fraction,
-            "bound": most.bound,
-            "time": most.time,
-        },
-        "joints": joints,
+        "largest_use": largest_json(robot, &d.certificate),
+        "joints": joints_json(robot, &found.limits, &d.certificate, d.torque.as_ref()),
         "torque_share": d.torque.as_ref().map(|t| t.share),
         "clearance": d.clearance.as_ref().map(|c| json!({
             "distance": c.distance,
@@ -77,7 +56,42 @@ pub(super) fn certificate_json(robot: &Robot, found: &Excitation) -> Value {
     })
 }
 
-fn criteria(c: &Conditioning) -> Value {
+/// What each joint uses of its limits.
+pub(super) fn joints_json(
+    robot: &Robot,
+    limits: &Limits,
+    certificate: &Certificate,
+    torque: Option<&TorqueCertificate>,
+) -> Vec<Value> {
+    let used = |u: &LimitUse, limit: Value| json!({ "limit": limit, "use": u.fraction, "bound": u.bound, "time": u.time });
+    let joints = robot.joints().iter().zip(&certificate.joints).enumerate();
+    joints
+        .map(|(j, (joint, u))| {
+            json!({
+                "joint": joint.name,
+                "position": used(&u.position, json!(limits.position[j])),
+                "velocity": used(&u.velocity, json!(limits.velocity[j])),
+                "acceleration": used(&u.acceleration, json!(limits.acceleration[j])),
+                "torque": torque.and_then(|t| t.joints[j].as_ref())
+                    .map(|u| used(u, json!(joint.limits.torque))),
+            })
+        })
+        .collect()
+}
+
+/// The limit used most.
+pub(super) fn largest_json(robot: &Robot, certificate: &Certificate) -> Value {
+    let (joint, kind, most) = certificate.largest();
+    json!({
+        "joint": robot.joints()[joint].name,
+        "limit": format!("{kind:?}").to_lowercase(),
+        "use": most.fraction,
+        "bound": most.bound,
+        "time": most.time,
+    })
+}
+
+pub(super) fn criteria(c: &Conditioning) -> Value {
     json!({
         "condition_by": "rows",
         "condition_number": { "raw": c.raw.two_norm, "equilibrated": c.equilibrated.two_norm },

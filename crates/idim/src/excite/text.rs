@@ -4,9 +4,11 @@ use super::Excitation;
 use super::arguments::CRITERIA;
 use super::interrupt::Stopped;
 use crate::table::{number, table};
-use idim_excitation::{Conditioning, Criterion, FourierDesign, Scaling};
+use idim_excitation::{
+    ClearanceCertificate, Conditioning, Criterion, FourierDesign, Scaling, TorqueCertificate,
+};
 use idim_model::Robot;
-use idim_trajectory::{JointUse, LimitUse};
+use idim_trajectory::{Certificate, JointUse, LimitUse};
 use std::fmt::Write as _;
 
 pub(super) fn excitation_text(robot: &Robot, found: &Excitation) -> String {
@@ -41,23 +43,32 @@ pub(super) fn excitation_text(robot: &Robot, found: &Excitation) -> String {
             |r| number(super::lowest(r))
         ),
     );
-    out + &criteria_text(found) + &limits_text(robot, found)
+    let d = &found.design;
+    let limits = limits_text(
+        robot,
+        &d.certificate,
+        d.torque.as_ref(),
+        d.clearance.as_ref(),
+    );
+    out + &criteria_text(found) + &limits
 }
 
 /// The criterion in the words of the command line.
 pub(super) fn criterion_name(found: &Excitation) -> String {
     let terms = &found.options.criteria;
-    let name = |criterion| {
-        CRITERIA
-            .iter()
-            .find(|c| c.1 == criterion)
-            .map_or("?", |c| c.0)
-    };
     if let [(_, criterion)] = terms[..] {
-        return name(criterion).into();
+        return term_name(criterion).into();
     }
-    let parts = terms.iter().map(|(w, c)| format!("{w} log {}", name(*c)));
+    let parts = terms
+        .iter()
+        .map(|(w, c)| format!("{w} log {}", term_name(*c)));
     parts.collect::<Vec<_>>().join(" + ")
+}
+
+/// One criterion in those words.
+pub(super) fn term_name(criterion: Criterion) -> &'static str {
+    let known = CRITERIA.iter().find(|c| c.1 == criterion);
+    known.map_or("?", |c| c.0)
 }
 
 fn search_text(found: &Excitation) -> String {
@@ -83,17 +94,23 @@ fn criteria_text(found: &Excitation) -> String {
     if let Some((weighted, random)) = &found.weighted {
         rows.extend(rows_of("weighted", weighted, random.as_ref(), false));
     }
-    let header = [
-        "criterion",
-        "this motion",
-        "best random",
-        "ratio (log: gain)",
-    ];
     format!(
         "\nCriteria of this motion alone\n{}{}\n",
-        table(header, rows),
+        table(HEADER, rows),
         route_text(found)
     )
+}
+
+const HEADER: [&str; 4] = [
+    "criterion",
+    "this motion",
+    "best random",
+    "ratio (log: gain)",
+];
+
+/// The criteria of rows, beside those of others.
+pub(super) fn criteria_table(found: &Conditioning, random: Option<&Conditioning>) -> String {
+    table(HEADER, rows_of("raw", found, random, true))
 }
 
 /// Relative error of a condition number from the eigenvalues of the information matrix: `p u cond² / 2`, `u` half an epsilon.
@@ -189,11 +206,15 @@ fn rows_of(
     picks.into_iter().map(cells).collect()
 }
 
-fn limits_text(robot: &Robot, found: &Excitation) -> String {
-    let certificate = &found.design.certificate;
+pub(super) fn limits_text(
+    robot: &Robot,
+    certificate: &Certificate,
+    torques: Option<&TorqueCertificate>,
+    clearance: Option<&ClearanceCertificate>,
+) -> String {
     let cell = |u: &LimitUse| format!("{:.2} % at {:.2}", 100.0 * u.bound, u.time);
     let torque = |j: usize| {
-        let of_joint = found.design.torque.as_ref()?.joints[j];
+        let of_joint = torques?.joints[j];
         of_joint.as_ref().map(cell)
     };
     let joints = robot.joints().iter().zip(&certificate.joints).enumerate();
@@ -215,14 +236,14 @@ fn limits_text(robot: &Robot, found: &Excitation) -> String {
         100.0 * most.bound,
         most.time,
     );
-    if let Some(torque) = &found.design.torque {
+    if let Some(torque) = torques {
         let _ = writeln!(
             out,
             "torques: by the inertial values of the robot file, at most {} % of each limit",
             100.0 * torque.share
         );
     }
-    if let Some(c) = &found.design.clearance {
+    if let Some(c) = clearance {
         let _ = writeln!(
             out,
             "clearance: {:.4} m between {} and {} at {:.2} s, never below {:.4} m ({} pairs)",

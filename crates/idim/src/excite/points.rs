@@ -1,0 +1,289 @@
+//! Exciting points of the energy model and the path through them, as Gautier & Khalil 1991 have it, for any robot.
+
+use super::interrupt::{Stopped, Watch};
+use super::{N_RANDOM, RANDOM_SHARE};
+use crate::columns::ExtraColumn;
+use crate::error::Error;
+use crate::progress::Progress;
+use crate::structure::{KeepOrder, Structure};
+use idim_excitation::{
+    Conditioning, Criterion, EnergyDesign, PointDesign, PointLimits, PointSearchOptions,
+    search_points, states_conditioning,
+};
+use idim_model::{Columns, DriveColumns, JointStates, Model, Robot};
+use idim_trajectory::{Certificate, Limits, PathPoint, QuinticPath};
+use rayon::prelude::{IntoParallelIterator, ParallelIterator};
+use std::ops::ControlFlow;
+
+/// Share of the velocity limits that points may use: the path is faster between them.
+const POINT_SPEED: f64 = 0.9;
+/// Where the path leaves its limits, points are searched again under smaller ones (the paper's remedy): as much smaller as it
+/// left them, and by this.
+const SPARE: f64 = 0.97;
+/// Searches at most: two or three are needed.
+const ATTEMPTS: usize = 8;
+/// Drawn in so many times, points stand almost still.
+const DRAWS: usize = 100;
+/// Share of the time left that one search may take: another may be needed, and the end of each takes its time.
+const SEARCH_SHARE: f64 = 0.3;
+/// Samples the torque rows of a path are looked at by, a segment.
+const SAMPLES: usize = 20;
+
+/// What points are asked to be.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PointOptions {
+    pub(super) criterion: Criterion,
+    /// Energy differences; twice the base parameters where not said, as the paper.
+    pub(super) n_rows: Option<usize>,
+    pub(super) largest_s: Option<f64>,
+    pub(super) n_starts: usize,
+    pub(super) n_rounds: usize,
+    pub(super) seed: u64,
+}
+
+/// Points with everything that is said of them.
+pub(super) struct PointExcitation {
+    pub(super) options: PointOptions,
+    /// Of the energy model.
+    pub(super) structure: Structure,
+    pub(super) points: PointDesign,
+    /// From rest through the points to rest, inside all limits.
+    pub(super) path: QuinticPath,
+    pub(super) certificate: Certificate,
+    /// Searches that were made, each under smaller limits than the one before.
+    pub(super) attempts: usize,
+    /// Whether the points were drawn in until the path kept its limits, since there was no time for another search.
+    pub(super) drawn_in: bool,
+    /// Best of the random chains, and how many there were.
+    pub(super) random: Option<(f64, Conditioning)>,
+    pub(super) n_random: usize,
+    /// Of the torque rows along the path, for the columns that `identify` uses.
+    pub(super) along: Conditioning,
+    pub(super) stopped: Stopped,
+}
+
+impl PointExcitation {
+    pub(super) fn value(&self) -> f64 {
+        of(self.options.criterion, &self.points.conditioning)
+    }
+}
+
+/// A criterion among all of them.
+fn of(criterion: Criterion, c: &Conditioning) -> f64 {
+    use idim_excitation::Scaling;
+    let numbers = |scaling| match scaling {
+        Scaling::Raw => c.raw,
+        Scaling::Equilibrated => c.equilibrated,
+    };
+    match criterion {
+        Criterion::TwoNorm(s) => numbers(s).two_norm,
+        Criterion::PivotedQr(s) => numbers(s).pivoted_qr,
+        Criterion::Frobenius(s) => numbers(s).frobenius,
+        Criterion::LogDet => -c.log_det,
+        Criterion::TraceInverse => c.trace_inverse,
+        Criterion::WorstDirection => 1.0 / c.smallest_singular_value,
+        Criterion::Equilibrium | Criterion::WeightedSum { .. } => f64::NAN,
+    }
+}
+
+/// Searches for points, and again under smaller limits while the path through them leaves its own.
+pub(super) fn excite_points(
+    robot: &Robot,
+    limits: &Limits,
+    options: PointOptions,
+    progress: &Progress,
+    watch: &Watch,
+) -> Result<PointExcitation, Error> {
+    let structure = Structure::of_energy(robot, KeepOrder::Links).decided()?;
+    let columns = structure.base_columns();
+    let n_rows = options.n_rows.unwrap_or(2 * columns.len());
+    let mut inside = PointLimits {
+        position: limits.position.clone(),
+        velocity: limits.velocity.iter().map(|v| POINT_SPEED * v).collect(),
+    };
+    let first = EnergyDesign::new(robot, &columns, inside.clone())?;
+    // Before anything is drawn: that the options make sense.
+    let search = PointSearchOptions {
+        n_rows,
+        criterion: options.criterion,
+        limit_of_equilibrium: options.largest_s,
+        n_starts: options.n_starts,
+        n_rounds: options.n_rounds,
+        seed: options.seed,
+    };
+    if n_rows >= columns.len() {
+        progress.stage(format!("{N_RANDOM} random chains of {n_rows} rows"));
+    }
+    let (random, n_random) = best_random(&first, n_rows, &options, watch);
+    let (mut attempts, mut drawn_in, mut cut_short) = (0, false, false);
+    let (points, path, certificate) = loop {
+        attempts += 1;
+        let design = EnergyDesign::new(robot, &columns, inside.clone())?;
+        let enough = watch.enough(SEARCH_SHARE);
+        let points = search_points(&design, &search, &mut |p| {
+            progress.stage(format!(
+                "search {attempts}: round {} of {}, best {:.5}; Ctrl-C takes it",
+                p.n_done, p.n_rounds, p.best
+            ));
+            if enough() {
+                cut_short = true;
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        })?;
+        let path = path_through(&points.points, &home(limits), limits)?;
+        let certificate = path.certificate(limits);
+        if certificate.certified {
+            break (points, path, certificate);
+        }
+        if attempts == ATTEMPTS || watch.enough(1.0)() {
+            drawn_in = true;
+            break drawn(&design, points, path, limits)?;
+        }
+        let shares = shares(&path.largest_overshoot(limits), limits);
+        for (j, share) in shares.into_iter().enumerate() {
+            let [low, high] = inside.position[j];
+            let (centre, half) = (f64::midpoint(low, high), 0.5 * share * (high - low));
+            inside.position[j] = [centre - half, centre + half];
+        }
+    };
+    let along = along(robot, &path)?;
+    let stopped = match watch.check() {
+        Err(_) => Stopped::Interrupted,
+        Ok(()) if cut_short || n_random < N_RANDOM => Stopped::OutOfTime,
+        Ok(()) => Stopped::No,
+    };
+    Ok(PointExcitation {
+        options: PointOptions {
+            n_rows: Some(n_rows),
+            ..options
+        },
+        structure,
+        points,
+        path,
+        certificate,
+        attempts,
+        drawn_in,
+        random,
+        n_random,
+        along,
+        stopped,
+    })
+}
+
+/// The best of many random chains, and how many there was time for.
+fn best_random(
+    design: &EnergyDesign,
+    n_rows: usize,
+    options: &PointOptions,
+    watch: &Watch,
+) -> (Option<(f64, Conditioning)>, usize) {
+    if n_rows < design.n_columns() {
+        return (None, 0);
+    }
+    let enough = watch.enough(RANDOM_SHARE);
+    let draws: Vec<Option<(f64, u64)>> = (0..N_RANDOM as u64)
+        .into_par_iter()
+        .map(|draw| {
+            if enough() {
+                return None;
+            }
+            let points = design.random_points(n_rows, options.seed, draw);
+            let w = design.observation_matrix(&points);
+            Some((options.criterion.evaluate(w.as_ref(), n_rows), draw))
+        })
+        .collect();
+    let tried: Vec<(f64, u64)> = draws.into_iter().flatten().collect();
+    let best = tried.iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let best = best.map(|&(value, draw)| {
+        let points = design.random_points(n_rows, options.seed, draw);
+        (value, design.conditioning(&points))
+    });
+    (best, tried.len())
+}
+
+/// Where a path begins and ends: amid the position limits.
+fn home(limits: &Limits) -> Vec<f64> {
+    (0..limits.n_joints()).map(|j| limits.centre(j)).collect()
+}
+
+/// The shortest path from rest at home through the points and back to rest there.
+pub(crate) fn path_through(
+    points: &JointStates,
+    home: &[f64],
+    limits: &Limits,
+) -> Result<QuinticPath, Error> {
+    let mut all = vec![PathPoint::at_rest(home)];
+    all.extend((0..points.n_samples()).map(|k| {
+        let s = points.state(k);
+        PathPoint { q: s.q, qd: s.qd }
+    }));
+    all.push(PathPoint::at_rest(home));
+    Ok(QuinticPath::shortest(&all, limits)?)
+}
+
+/// By how much less of its position limits each joint's points may use: as if a path grew with its points, and a little more.
+fn shares(overshoot: &[f64], limits: &Limits) -> Vec<f64> {
+    let share = |(j, over): (usize, &f64)| {
+        let half = limits.half_range(j);
+        if *over > 0.0 {
+            SPARE * half / (half + over)
+        } else {
+            1.0
+        }
+    };
+    overshoot.iter().enumerate().map(share).collect()
+}
+
+/// The points of joints that leave their limits drawn in towards rest at home until the path through them does not.
+fn drawn(
+    design: &EnergyDesign,
+    mut found: PointDesign,
+    mut path: QuinticPath,
+    limits: &Limits,
+) -> Result<(PointDesign, QuinticPath, Certificate), Error> {
+    let home = home(limits);
+    for _ in 0..DRAWS {
+        let shares = shares(&path.largest_overshoot(limits), limits);
+        for (j, (home, share)) in home.iter().zip(shares).enumerate() {
+            for q in found.points.q_mut(j) {
+                *q = home + share * (*q - home);
+            }
+            for qd in found.points.qd_mut(j) {
+                *qd *= share;
+            }
+        }
+        path = path_through(&found.points, &home, limits)?;
+        let certificate = path.certificate(limits);
+        if certificate.certified {
+            found.conditioning = design.conditioning(&found.points);
+            return Ok((found, path, certificate));
+        }
+    }
+    Err(Error::input(
+        "--family points",
+        "no path through exciting points stays inside the limits",
+        "nothing is written; give wider limits, or take the Fourier motion",
+    ))
+}
+
+/// Every criterion of the torque rows along a path, for the columns that `identify` uses.
+fn along(robot: &Robot, path: &QuinticPath) -> Result<Conditioning, Error> {
+    let all = Columns::standard(robot.n_joints(), DriveColumns::ALL);
+    let base = Structure::of_drives(robot, all)
+        .decided()?
+        .base_model_columns();
+    let added: Vec<_> = base.extra.iter().filter_map(ExtraColumn::added).collect();
+    let n = SAMPLES * path.n_segments();
+    let times: Vec<f64> = (0..n)
+        .map(|k| path.duration() * k as f64 / n as f64)
+        .collect();
+    let noise = vec![1.0; robot.n_joints()];
+    Ok(states_conditioning(
+        &Model::new(robot),
+        (&base.standard, &added),
+        &path.states(&times),
+        &noise,
+    ))
+}
