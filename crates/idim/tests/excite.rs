@@ -366,6 +366,14 @@ fn identity_exciting_points_and_a_certified_path_through_them() {
         bench.file("again", "motion.json"),
         bench.file("out", "motion.json")
     );
+    // Without time for another search, points are slowed down until the path keeps its limits.
+    let text = ask("hurried", &["--time-budget", "1e-6"]).unwrap();
+    assert!(text.contains("slowed down"), "{text}");
+    let file = TrajectoryFile::from_ron(&bench.file("hurried", "motion.ron")).unwrap();
+    let Motion::Quintic(path) = file.motion().unwrap() else {
+        panic!("not a path")
+    };
+    assert!(path.certificate(&limits).certified);
     // What belongs to the other family is not dropped in silence.
     let refused = |more: &[&str], words: &[&str]| {
         let message = ask("refused", more).unwrap_err();

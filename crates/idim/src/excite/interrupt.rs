@@ -52,7 +52,7 @@ impl Watch {
     }
 
     /// Time left of the budget, s; `None` without one.
-    fn left(&self) -> Option<f64> {
+    pub(crate) fn left(&self) -> Option<f64> {
         let spent = self.started.elapsed().as_secs_f64();
         self.budget.map(|budget| (budget - spent).max(0.0))
     }

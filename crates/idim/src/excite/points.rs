@@ -22,8 +22,9 @@ const POINT_SPEED: f64 = 0.9;
 const SPARE: f64 = 0.97;
 /// Searches at most: two or three are needed.
 const ATTEMPTS: usize = 8;
-/// Drawn in so many times, points stand almost still.
-const DRAWS: usize = 100;
+/// A point whose path leaves its limits is slowed down by this; so many times at most, after which it stands still.
+const SLOWER: f64 = 0.85;
+const SLOWINGS: usize = 200;
 /// Share of the time left that one search may take: another may be needed, and the end of each takes its time.
 const SEARCH_SHARE: f64 = 0.3;
 /// Samples the torque rows of a path are looked at by, a segment.
@@ -52,8 +53,8 @@ pub(super) struct PointExcitation {
     pub(super) certificate: Certificate,
     /// Searches that were made, each under smaller limits than the one before.
     pub(super) attempts: usize,
-    /// Whether the points were drawn in until the path kept its limits, since there was no time for another search.
-    pub(super) drawn_in: bool,
+    /// Whether points were slowed down until the path kept its limits, since there was no time for another search.
+    pub(super) slowed_down: bool,
     /// Best of the random chains, and how many there were.
     pub(super) random: Option<(f64, Conditioning)>,
     pub(super) n_random: usize,
@@ -97,10 +98,7 @@ pub(super) fn excite_points(
     let structure = Structure::of_energy(robot, KeepOrder::Links).decided()?;
     let columns = structure.base_columns();
     let n_rows = options.n_rows.unwrap_or(2 * columns.len());
-    let mut inside = PointLimits {
-        position: limits.position.clone(),
-        velocity: limits.velocity.iter().map(|v| POINT_SPEED * v).collect(),
-    };
+    let mut inside = point_limits(limits);
     let first = EnergyDesign::new(robot, &columns, inside.clone())?;
     // Before anything is drawn: that the options make sense.
     let search = PointSearchOptions {
@@ -115,11 +113,11 @@ pub(super) fn excite_points(
         progress.stage(format!("{N_RANDOM} random chains of {n_rows} rows"));
     }
     let (random, n_random) = best_random(&first, n_rows, &options, watch);
-    let (mut attempts, mut drawn_in, mut cut_short) = (0, false, false);
+    let (mut attempts, mut slowed_down, mut cut_short) = (0, false, false);
     let (points, path, certificate) = loop {
         attempts += 1;
         let design = EnergyDesign::new(robot, &columns, inside.clone())?;
-        let enough = watch.enough(SEARCH_SHARE);
+        let (enough, before) = (watch.enough(SEARCH_SHARE), watch.left());
         let points = search_points(&design, &search, &mut |p| {
             progress.stage(format!(
                 "search {attempts}: round {} of {}, best {:.5}; Ctrl-C takes it",
@@ -137,9 +135,11 @@ pub(super) fn excite_points(
         if certificate.certified {
             break (points, path, certificate);
         }
-        if attempts == ATTEMPTS || watch.enough(1.0)() {
-            drawn_in = true;
-            break drawn(&design, points, path, limits)?;
+        // Another search takes as long as this one.
+        let no_time = before.zip(watch.left()).is_some_and(|(b, a)| a <= b - a);
+        if attempts == ATTEMPTS || no_time || watch.check().is_err() {
+            slowed_down = true;
+            break slowed(&design, points, path, limits)?;
         }
         let shares = shares(&path.largest_overshoot(limits), limits);
         for (j, share) in shares.into_iter().enumerate() {
@@ -164,12 +164,27 @@ pub(super) fn excite_points(
         path,
         certificate,
         attempts,
-        drawn_in,
+        slowed_down,
         random,
         n_random,
         along,
         stopped,
     })
+}
+
+/// Limits of points: room enough to stop from most of their speed, if that leaves half of the range.
+fn point_limits(limits: &Limits) -> PointLimits {
+    let velocity: Vec<f64> = limits.velocity.iter().map(|v| POINT_SPEED * v).collect();
+    let position = (0..limits.n_joints()).map(|j| {
+        let (centre, half) = (limits.centre(j), limits.half_range(j));
+        let way = velocity[j].powi(2) / (2.0 * limits.acceleration[j]);
+        let inner = (half - way).max(0.5 * half);
+        [centre - inner, centre + inner]
+    });
+    PointLimits {
+        position: position.collect(),
+        velocity,
+    }
 }
 
 /// The best of many random chains, and how many there was time for.
@@ -236,25 +251,31 @@ fn shares(overshoot: &[f64], limits: &Limits) -> Vec<f64> {
     overshoot.iter().enumerate().map(share).collect()
 }
 
-/// The points of joints that leave their limits drawn in towards rest at home until the path through them does not.
-fn drawn(
+/// The points slowed down where the path beside them leaves its limits, until it does not: between points at rest inside the
+/// limits a path stays inside.
+fn slowed(
     design: &EnergyDesign,
     mut found: PointDesign,
     mut path: QuinticPath,
     limits: &Limits,
 ) -> Result<(PointDesign, QuinticPath, Certificate), Error> {
-    let home = home(limits);
-    for _ in 0..DRAWS {
-        let shares = shares(&path.largest_overshoot(limits), limits);
-        for (j, (home, share)) in home.iter().zip(shares).enumerate() {
-            for q in found.points.q_mut(j) {
-                *q = home + share * (*q - home);
-            }
-            for qd in found.points.qd_mut(j) {
-                *qd *= share;
+    let n_points = found.points.n_samples();
+    for _ in 0..SLOWINGS {
+        let mut slower = vec![vec![false; n_points]; limits.n_joints()];
+        for o in path.overshoot(limits) {
+            // The path begins at home, before the first point.
+            let beside = [o.segment.checked_sub(1), Some(o.segment)];
+            for k in beside.into_iter().flatten().filter(|k| *k < n_points) {
+                slower[o.joint][k] = true;
             }
         }
-        path = path_through(&found.points, &home, limits)?;
+        for (j, slower) in slower.iter().enumerate() {
+            let speeds = found.points.qd_mut(j).iter_mut().zip(slower);
+            for (qd, _) in speeds.filter(|(_, slower)| **slower) {
+                *qd *= SLOWER;
+            }
+        }
+        path = path_through(&found.points, &home(limits), limits)?;
         let certificate = path.certificate(limits);
         if certificate.certified {
             found.conditioning = design.conditioning(&found.points);

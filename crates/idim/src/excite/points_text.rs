@@ -37,8 +37,8 @@ pub(super) fn points_text(robot: &Robot, found: &PointExcitation) -> String {
     if found.attempts > 1 {
         out += "points searched again under smaller limits where the path left its own\n";
     }
-    if found.drawn_in {
-        out += "points drawn in towards rest until the path kept its limits: a longer search finds better ones\n";
+    if found.slowed_down {
+        out += "points slowed down where the path left its limits, for want of time: a longer search finds better ones\n";
     }
     let _ = writeln!(
         out,
@@ -93,7 +93,7 @@ pub(super) fn points_json(robot: &Robot, limits: &Limits, found: &PointExcitatio
             "starts": o.n_starts,
             "rounds": o.n_rounds,
             "searches": found.attempts,
-            "drawn_in": found.drawn_in,
+            "slowed_down": found.slowed_down,
             "evaluations": p.n_evaluations,
             "reproducible": found.stopped == Stopped::No,
         },
