@@ -33,33 +33,46 @@ impl Rows {
     pub(crate) fn new(model: &Model, columns: &Columns) -> Self {
         let n = model.n_joints();
         let plan = Plan::new(model, columns);
-        let packing = Packing::new(model, columns, &plan);
-        let mut first = Vec::with_capacity(n);
+        // What stands in a row, in the order of a `Packing` without the observation.
+        let mut length = vec![0; n];
+        let mut links = vec![0; n * n];
+        for (j, link) in plan.links.iter().enumerate().rev() {
+            for (k, &joint) in model.path(j).iter().enumerate() {
+                links[j * n + k] = length[joint];
+                length[joint] += link.n_wanted();
+            }
+        }
+        let mut drives = vec![0; n];
         let mut end = 0;
-        for keys in &packing.keys {
-            first.push(end);
-            // The observation is not part of these rows.
-            end += keys.len() - 1;
+        for (i, length) in length.iter_mut().enumerate() {
+            drives[i] = end + *length;
+            let first = end;
+            end = drives[i] + plan.drives[i].len();
+            *length = first;
+        }
+        let first = length;
+        for j in 0..n {
+            for (k, &joint) in model.path(j).iter().enumerate() {
+                links[j * n + k] += first[joint];
+            }
         }
         let mut places = vec![end; n * columns.len()];
-        for (joint, keys) in packing.keys.iter().enumerate() {
-            for (column, (key, _)) in packing.columns.iter().enumerate() {
-                if let Ok(place) = keys.binary_search(key) {
-                    places[joint * columns.len() + column] = first[joint] + place;
+        for (column, p) in columns.0.iter().enumerate() {
+            let j = p.index;
+            if let Some(k) = p.kind.inertial_index() {
+                let rank = plan.links[j].rank::<ASK>(model.joints[j].link.entry(k).0);
+                for (k, &joint) in model.path(j).iter().enumerate() {
+                    places[joint * columns.len() + column] = links[j * n + k] + rank;
                 }
+            } else {
+                let d = plan.drives[j].iter().position(|&(kind, _)| kind == p.kind);
+                debug_assert!(d.is_some(), "column {column} has no drive");
+                places[j * columns.len() + column] = drives[j] + d.unwrap_or(0);
             }
         }
         Self {
-            links: packing
-                .start
-                .iter()
-                .map(|&(joint, start)| first[joint] + start)
-                .collect(),
-            drives: first
-                .iter()
-                .zip(&packing.drives)
-                .map(|(a, b)| a + b)
-                .collect(),
+            links,
+            drives,
             plan,
             places,
             n_cells: end + ROOM,
