@@ -78,6 +78,43 @@ impl CheckedFinding {
     }
 }
 
+/// Codes of what can be found in a log that can be read.
+pub const CODES: [&str; 33] = [
+    "sample-rate",
+    "time-unit",
+    "jitter",
+    "gaps",
+    "stale-samples",
+    "position-jump",
+    "torque-spike",
+    "saturation",
+    "quantised-position",
+    "quantised-torque",
+    "standstill",
+    "unexcited-joint",
+    "position-range",
+    "degrees",
+    "velocity-unit",
+    "velocity-sign",
+    "velocity-factor",
+    "velocity-delay",
+    "velocity-unrelated",
+    "torque-sign",
+    "position-sign",
+    "joint-axis",
+    "joint-order",
+    "gear-side",
+    "torque-unit",
+    "torque-is-current",
+    "torque-scale",
+    "gravity-direction",
+    "gravity-compensated",
+    "torque-range",
+    "torque-delay",
+    "wrong-robot",
+    "unexplained-torque",
+];
+
 /// A finding accepted by name: `CODE`, or `CODE:JOINT` for one joint only.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Waiver {
@@ -97,6 +134,12 @@ impl FromStr for Waiver {
         };
         if code.is_empty() || joint.as_ref().is_some_and(String::is_empty) {
             return Err("write CODE or CODE:JOINT, as `idim check` prints them".into());
+        }
+        if !CODES.contains(&code) {
+            return Err(format!(
+                "no finding has the code `{code}`; those of a log that can be read are {}",
+                CODES.join(", ")
+            ));
         }
         Ok(Self {
             code: code.to_owned(),

@@ -1,20 +1,19 @@
 //! Commands beside `identify`: loads, drive gains, torque constants.
 
-use crate::check::Waiver;
 use crate::cli::{RobotChanges, load, say};
 use crate::drive_gains::drive_gains;
 use crate::error::Error;
+use crate::fit::EstimationOptions;
 use crate::identify::{Identification, IdentifyOptions, identify};
 use crate::load::{LoadedRobot, read_text};
+use crate::log_options::{FittingArgs, ReadingArgs, SamplingArgs};
 use crate::log_spec::LogSpec;
-use crate::logs::{Logs, read_logs, read_mapping};
+use crate::logs::{Logs, read_logs};
 use crate::payload::identify_payload;
-use crate::plan::SamplingOptions;
 use crate::report::warnings_text;
 use crate::table::{number, optional, table};
 use crate::torque_constants::torque_constant;
 use clap::Args;
-use idim_model::DriveColumns;
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -34,18 +33,15 @@ pub struct LoadedRuns {
     /// Link that carries the load (default: the last).
     #[arg(long, value_name = "LINK")]
     pub on: Option<String>,
-    /// Which column holds what, where the header does not say so (RON).
-    #[arg(long, value_name = "FILE")]
-    pub mapping: Option<PathBuf>,
-    /// Take q, qd, qdd and torque as they are.
-    #[arg(long)]
-    pub as_recorded: bool,
-    /// Low-pass of positions and velocities, Hz (default: by the error on blocks held out).
-    #[arg(long, value_name = "HZ")]
-    pub cutoff: Option<f64>,
-    /// Finding of the log doctor that does not stop the run, CODE or CODE:JOINT; may be repeated.
-    #[arg(long, value_name = "CODE[:JOINT]")]
-    pub waive: Vec<Waiver>,
+    /// How logs are read.
+    #[command(flatten)]
+    pub reading: ReadingArgs,
+    /// How a log becomes samples.
+    #[command(flatten)]
+    pub sampling: SamplingArgs,
+    /// What is fitted to them.
+    #[command(flatten)]
+    pub fitting: FittingArgs,
     /// Changes to the robot.
     #[command(flatten)]
     pub changes: RobotChanges,
@@ -83,13 +79,27 @@ struct Runs {
     without: Logs,
     with: Logs,
     link: usize,
+    estimation: EstimationOptions,
 }
 
 fn runs(args: &LoadedRuns) -> Result<Runs, Error> {
     let loaded = load(&args.robot, &args.changes)?;
-    let mapping = read_mapping(args.mapping.as_ref())?;
-    let without = read_logs(&args.log, &loaded, &mapping, &args.waive)?;
-    let with = read_logs(&args.loaded, &loaded, &mapping, &args.waive)?;
+    let (columns, friction) = args.fitting.model()?;
+    let options = IdentifyOptions {
+        columns,
+        sampling: args.sampling.options(&loaded.robot)?,
+        friction,
+        estimation: EstimationOptions {
+            weighting: args.fitting.weighting(),
+            robust: args.fitting.loss(),
+            essential: false,
+        },
+        ..IdentifyOptions::default()
+    };
+    let mapping = args.reading.mapping()?;
+    let waivers = args.reading.waivers(&loaded.robot)?;
+    let without = read_logs(&args.log, &loaded, &mapping, waivers)?;
+    let with = read_logs(&args.loaded, &loaded, &mapping, waivers)?;
     let links = loaded.robot.links();
     let link = match &args.on {
         None => links.len() - 1,
@@ -98,15 +108,6 @@ fn runs(args: &LoadedRuns) -> Result<Runs, Error> {
             let rule = format!("the links are {}", names.join(", "));
             Error::input(format!("--on {name}"), "no such link", rule)
         })?,
-    };
-    let options = IdentifyOptions {
-        columns: DriveColumns::ALL,
-        sampling: SamplingOptions {
-            as_recorded: args.as_recorded,
-            cutoff: args.cutoff,
-            ..SamplingOptions::default()
-        },
-        ..IdentifyOptions::default()
     };
     // All of the runs without load train: what proves the arm is `identify`.
     let arm = identify(
@@ -121,6 +122,7 @@ fn runs(args: &LoadedRuns) -> Result<Runs, Error> {
         without,
         with,
         link,
+        estimation: options.estimation,
     })
 }
 
@@ -130,7 +132,13 @@ fn runs(args: &LoadedRuns) -> Result<Runs, Error> {
 /// Bad input.
 pub(crate) fn payload(args: &LoadedRuns, out: &mut dyn Write) -> Result<(), Error> {
     let runs = runs(args)?;
-    let found = identify_payload(&runs.loaded, &runs.arm, &runs.with.measurements, runs.link)?;
+    let found = identify_payload(
+        &runs.loaded,
+        &runs.arm,
+        &runs.with.measurements,
+        runs.link,
+        &runs.estimation,
+    )?;
     if args.json {
         let parameters: Vec<_> = (0..found.names.len())
             .map(|k| {
@@ -199,6 +207,15 @@ pub(crate) fn run_drive_gains(args: &DriveGainsArgs, out: &mut dyn Write) -> Res
     if !(args.mass > 0.0 && args.mass.is_finite()) {
         let rule = "give the weighed mass in kg, above zero";
         return Err(Error::input("--mass", args.mass.to_string(), rule));
+    }
+    let fitting = args.runs.fitting.given();
+    let unused = ["--weighting", "--robust"];
+    if let Some(option) = fitting.iter().find(|o| unused.contains(o)) {
+        return Err(Error::input(
+            format!("drive-gains and {option}"),
+            "total least squares weights each joint by its own noise, with no loss beside it",
+            format!("leave out {option}"),
+        ));
     }
     let runs = runs(&args.runs)?;
     let found = drive_gains(

@@ -2,6 +2,7 @@
 
 use crate::columns::ModelColumns;
 use crate::error::Error;
+use crate::fit::EstimationOptions;
 use crate::identify::Identification;
 use crate::load::LoadedRobot;
 use crate::samples::{Rows, push_rows, stretches};
@@ -34,7 +35,7 @@ pub struct Payload {
 /// The load on `link` that explains what the arm as identified leaves of the torques of these logs.
 ///
 /// With `x = G (y - W β̂)` the covariance is that of the noise plus `G W C_β Wᵀ Gᵀ`: the arm is frozen, but not believed
-/// blindly. Conditioned as the arm's logs were.
+/// blindly. Conditioned as the arm's logs were, weighted as `estimation` says.
 ///
 /// # Errors
 /// Logs that cannot be conditioned, or that do not excite any parameter of the load.
@@ -43,6 +44,7 @@ pub fn identify_payload(
     arm: &Identification,
     logs: &[Measurements],
     link: usize,
+    estimation: &EstimationOptions,
 ) -> Result<Payload, Error> {
     let robot = &loaded.robot;
     let n = robot.n_joints();
@@ -76,7 +78,12 @@ pub fn identify_payload(
         used: &of_load.used,
         n_joints: n,
     };
-    let Ok(fit) = partial_least_squares(&rows, &PartialOptions::default())? else {
+    let options = PartialOptions {
+        weighting: estimation.weighting,
+        loss: estimation.robust,
+        ..PartialOptions::default()
+    };
+    let Ok(fit) = partial_least_squares(&rows, &options)? else {
         return Err(Error::input(
             "payload",
             "the loaded logs determine no parameter of it",

@@ -4,8 +4,9 @@ use super::{CHECK_SCHEMA, CheckResult, CheckedLog, Waiver, check_text, diagnose,
 use crate::cli::{RobotChanges, load, say};
 use crate::error::Error;
 use crate::load::LoadedRobot;
+use crate::log_options::ReadingArgs;
 use crate::log_spec::LogSpec;
-use crate::logs::{read_log_spec, read_mapping};
+use crate::logs::read_log_spec;
 use crate::progress::Progress;
 use clap::Args;
 use idim_measurement::Log;
@@ -22,12 +23,9 @@ pub struct CheckArgs {
     /// Log to examine, named as for `identify`; may be repeated.
     #[arg(long, value_name = "LOG", num_args = 1.., required = true, value_parser = LogSpec::parse)]
     pub log: Vec<LogSpec>,
-    /// Which column holds what, where the header does not say so (docs/logs.md).
-    #[arg(long, alias = "map", value_name = "FILE")]
-    pub mapping: Option<PathBuf>,
-    /// Accept a finding by name, of all joints or of one; may be repeated.
-    #[arg(long, value_name = "CODE[:JOINT]")]
-    pub waive: Vec<Waiver>,
+    /// How logs are read.
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Print idim-check/1 (docs/check.md) instead of tables.
     #[arg(long)]
     pub json: bool,
@@ -39,7 +37,8 @@ pub struct CheckArgs {
 /// Examines logs; an error where a finding would spoil a result.
 pub(crate) fn run_check(args: &CheckArgs, out: &mut dyn Write) -> Result<(), Error> {
     let loaded = load(&args.robot, &args.changes)?;
-    let mapping = read_mapping(args.mapping.as_ref())?;
+    let mapping = args.reading.mapping()?;
+    let waivers = args.reading.waivers(&loaded.robot)?;
     let progress = Progress::new();
     let mut read = Vec::new();
     for spec in &args.log {
@@ -47,7 +46,7 @@ pub(crate) fn run_check(args: &CheckArgs, out: &mut dyn Write) -> Result<(), Err
         read.push((spec.name(), read_log_spec(spec, &loaded, &mapping)));
     }
     progress.stage("examining");
-    let logs = examined(read, &loaded, &args.waive)?;
+    let logs = examined(read, &loaded, waivers)?;
     progress.finish();
     let findings = logs.iter().flat_map(|l| &l.findings);
     let result = CheckResult {
