@@ -5,7 +5,7 @@ use crate::drive_gains::drive_gains;
 use crate::error::Error;
 use crate::fit::EstimationOptions;
 use crate::identify::{Identification, IdentifyOptions, identify};
-use crate::load::{LoadedRobot, read_text};
+use crate::load::LoadedRobot;
 use crate::log_options::{FittingArgs, ReadingArgs, SamplingArgs};
 use crate::log_spec::LogSpec;
 use crate::logs::{Logs, read_logs};
@@ -14,9 +14,10 @@ use crate::report::warnings_text;
 use crate::table::{number, optional, table};
 use crate::torque_constants::torque_constant;
 use clap::Args;
+use idim_measurement::{BackEmf, read_back_emf};
 use std::fmt::Write as _;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A robot, its runs without load and those with one.
 #[derive(Debug, Clone, Args)]
@@ -64,7 +65,8 @@ pub struct DriveGainsArgs {
 /// Arguments of `torque-constants`.
 #[derive(Debug, Clone, Args)]
 pub struct TorqueConstantsArgs {
-    /// CSV with a header: `speed` (rad/s, of the motor), `voltage` (V, terminals open), and `motor` where there are several.
+    /// CSV with a header: `speed` (of the motor, rad/s or as speed_rpm), `voltage` (terminals open, V or as voltage_mV), and
+    /// `motor` where there are several.
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// Print the answer as JSON.
@@ -268,10 +270,14 @@ pub(crate) fn torque_constants(
     args: &TorqueConstantsArgs,
     out: &mut dyn Write,
 ) -> Result<(), Error> {
-    let motors = read_back_emf(&args.file)?;
+    let bytes = std::fs::read(&args.file).map_err(|source| Error::Read {
+        path: args.file.clone(),
+        source,
+    })?;
+    let (motors, inferred) = read_back_emf(&bytes, &args.file.display().to_string())?;
     let mut rows = Vec::new();
     let mut json = Vec::new();
-    let mut notes = Vec::new();
+    let mut notes = inferred.clone();
     for BackEmf {
         motor,
         speed,
@@ -298,7 +304,9 @@ pub(crate) fn torque_constants(
         ]);
     }
     if args.json {
-        let json = serde_json::json!({ "schema": "idim-torque-constants/1", "motors": json });
+        let json = serde_json::json!({
+            "schema": "idim-torque-constants/1", "motors": json, "inferred": inferred,
+        });
         return say(out, &format!("{json:#}\n"));
     }
     let header = [
@@ -311,66 +319,4 @@ pub(crate) fn torque_constants(
     ];
     let text = format!("Torque constants from back-EMF\n{}", table(header, rows));
     say(out, &(text + &warnings_text(&notes)))
-}
-
-/// What was recorded of one motor.
-struct BackEmf {
-    motor: String,
-    speed: Vec<f64>,
-    voltage: Vec<f64>,
-}
-
-/// Speeds and voltages of each motor of a file, in the order they appear.
-fn read_back_emf(file: &Path) -> Result<Vec<BackEmf>, Error> {
-    let text = read_text(file)?;
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .filter(|(_, l)| !l.trim().is_empty());
-    let name = file.display().to_string();
-    let refuse = |line: usize, met: String, rule: &str| {
-        Err(Error::input(
-            format!("{name}, line {}", line + 1),
-            met,
-            rule,
-        ))
-    };
-    let header = lines.next().map_or("", |(_, l)| l);
-    let columns: Vec<String> = header.split(',').map(|h| h.trim().to_lowercase()).collect();
-    let at = |wanted: &str| {
-        columns
-            .iter()
-            .position(|c| c.split(['_', ' ', '[', '(']).next() == Some(wanted))
-    };
-    let (Some(s), Some(v)) = (at("speed"), at("voltage")) else {
-        let rule =
-            "name the columns speed (rad/s) and voltage (V), and motor where there are several";
-        return refuse(0, format!("header `{header}`"), rule);
-    };
-    let motor = at("motor");
-    let mut motors: Vec<BackEmf> = Vec::new();
-    for (k, line) in lines {
-        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-        let number = |c: usize| cells.get(c).and_then(|t| t.parse::<f64>().ok());
-        let (Some(speed), Some(voltage)) = (number(s), number(v)) else {
-            return refuse(
-                k,
-                format!("`{line}`"),
-                "every line has a number for speed and voltage",
-            );
-        };
-        let own = motor.and_then(|m| cells.get(m)).copied().unwrap_or("motor");
-        let found = motors.iter().position(|m| m.motor == own);
-        let at = found.unwrap_or_else(|| {
-            motors.push(BackEmf {
-                motor: own.to_owned(),
-                speed: Vec::new(),
-                voltage: Vec::new(),
-            });
-            motors.len() - 1
-        });
-        motors[at].speed.push(speed);
-        motors[at].voltage.push(voltage);
-    }
-    Ok(motors)
 }

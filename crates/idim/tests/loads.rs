@@ -244,9 +244,48 @@ fn identity_a_torque_constant_is_the_slope_of_back_emf() {
     }
     let shown = run(&["torque-constants", path(&file)]).unwrap();
     assert!(!shown.contains("one direction"), "{shown}");
-    std::fs::write(&file, "speed,voltage\n1,x\n").unwrap();
-    let refused = run(&["torque-constants", path(&file)]).unwrap_err();
-    assert!(refused.contains("line 2"), "{refused}");
+    // The same in another dialect and other units.
+    let text = std::fs::read_to_string(&file).unwrap();
+    let mut other = String::from("# turned by hand\nVoltage [mV];Speed [rpm];note;Motor\n");
+    for line in text.lines().skip(1) {
+        let cells: Vec<&str> = line.split(',').collect();
+        let [speed, voltage] = [1, 2].map(|k: usize| cells[k].parse::<f64>().unwrap());
+        let rpm = speed * 30.0 / std::f64::consts::PI;
+        let _ = writeln!(other, "{};{rpm};x;{}", 1e3 * voltage, cells[0]);
+    }
+    std::fs::write(&file, other.replace('.', ",")).unwrap();
+    let same = json(&["torque-constants", path(&file), "--json"]);
+    for (a, b) in found["motors"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(same["motors"].as_array().unwrap())
+    {
+        let [a, b] = [a, b].map(|m| m["torque_constant"].as_f64().unwrap());
+        assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+    }
+    assert!(
+        same["inferred"]
+            .to_string()
+            .contains("columns left out: note"),
+        "{same:#}"
+    );
+    for (text, words) in [
+        (
+            "speed,voltage\n1,x\n",
+            &["line 2", "column voltage", "`x`"][..],
+        ),
+        ("speed,voltage\n1,2\n3\n", &["line 3", "1 cells"]),
+        ("speed_knots,voltage\n1,2\n", &["`knots`", "rpm"]),
+        ("rate,voltage\n1,2\n", &["no column `speed`", "rate"]),
+        ("speed,voltage\n1,nan\n", &["line 2", "finite"]),
+    ] {
+        std::fs::write(&file, text).unwrap();
+        let refused = run(&["torque-constants", path(&file)]).unwrap_err();
+        for word in words {
+            assert!(refused.contains(word), "`{word}` is not in: {refused}");
+        }
+    }
 }
 
 fn path(file: &Path) -> &str {

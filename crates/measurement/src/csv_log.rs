@@ -1,12 +1,13 @@
 //! Reading a log from the text of a CSV file.
 
-use crate::dialect::{Dialect, decode, find_dialect, find_head, without_hint};
+use crate::dialect::{Dialect, decode, without_hint};
 use crate::error::{Error, Place, printable};
 use crate::header::JointLabel;
 use crate::layout::{Layout, Source, find_layout};
 use crate::log::{Log, Parts, assemble, objection};
 use crate::mapping::ColumnMapping;
 use crate::quantity::Quantity;
+use crate::sheet::{Line, Sheet, number};
 
 /// Reads a log from the bytes of a CSV file.
 ///
@@ -26,31 +27,12 @@ pub fn read_csv(
     let text = decode(bytes, file)?;
     let text = without_hint(text);
     let text = text.as_ref();
-    let head = find_head(text, file)?;
-    let dialect = find_dialect(text, &head, file)?;
-    let mut reader = csv::ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .comment(Some(b'#'))
-        .delimiter(dialect.separator as u8)
-        .from_reader(text.as_bytes());
-    let mut record = csv::StringRecord::new();
-    let headers = if head.commented {
-        let cells = head.header.split(dialect.separator).map(str::trim);
-        cells
-            .filter(|c| !c.is_empty())
-            .map(str::to_string)
-            .collect()
-    } else {
-        next(&mut reader, &mut record, file)?;
-        fields(&record, dialect)
-            .map(|f| f.trim().to_string())
-            .collect::<Vec<_>>()
-    };
+    let mut sheet = Sheet::open(text, file)?;
+    let (headers, dialect) = (sheet.headers.clone(), sheet.dialect);
     let layout = find_layout(&headers, joints, mapping, file)?;
     let mut table = Table::new(&headers, &layout, dialect, file);
-    while next(&mut reader, &mut record, file)? {
-        table.push(&record)?;
+    while let Some(line) = sheet.next_line()? {
+        table.push(&line)?;
     }
     let parts = Parts {
         columns: table.columns,
@@ -60,27 +42,6 @@ pub fn read_csv(
         layout,
     };
     assemble(file, joints, mapping, parts)
-}
-
-fn next(
-    reader: &mut csv::Reader<&[u8]>,
-    record: &mut csv::StringRecord,
-    file: &str,
-) -> Result<bool, Error> {
-    reader.read_record(record).map_err(|e| {
-        let line = e.position().map_or(0, csv::Position::line);
-        Error::log(
-            "syntax",
-            Place::file(file).line(line),
-            e.to_string(),
-            "repair the line",
-        )
-    })
-}
-
-fn fields(record: &csv::StringRecord, dialect: Dialect) -> impl Iterator<Item = &str> + use<'_> {
-    let runs = dialect.separator == ' ';
-    record.iter().filter(move |f| !runs || !f.is_empty())
 }
 
 /// The needed columns, filled line by line.
@@ -108,24 +69,13 @@ impl<'a> Table<'a> {
         }
     }
 
-    fn push(&mut self, record: &csv::StringRecord) -> Result<(), Error> {
-        let line = record.position().map_or(0, csv::Position::line);
-        let cells: Vec<&str> = fields(record, self.dialect).collect();
-        if cells.len() == 1 && cells[0].trim().is_empty() {
-            return Ok(());
-        }
-        if cells.len() != self.headers.len() {
-            return Err(Error::log(
-                "field-count",
-                Place::file(self.file).line(line),
-                format!(
-                    "{} cells, where the header has {}",
-                    cells.len(),
-                    self.headers.len()
-                ),
-                "every line has a cell for each column; repair or remove the line (the last one may be cut off)",
-            ));
-        }
+    fn push(&mut self, line: &Line<'_>) -> Result<(), Error> {
+        line.check_count(self.headers.len(), self.file)?;
+        let Line {
+            number: line,
+            cells,
+        } = line;
+        let line = *line;
         let mut row = Vec::with_capacity(self.sources.len());
         for &(quantity, source) in &self.sources {
             row.push(self.value(quantity, source, cells[source.column], line)?);
@@ -158,36 +108,17 @@ impl<'a> Table<'a> {
         cell: &str,
         line: u64,
     ) -> Result<f64, Error> {
-        let cell = cell.trim();
         let refuse = |code, met: String, rule: &str| {
             let place = Place::file(self.file).line(line);
             let place = place.column(&self.headers[source.column]);
-            Err(Error::log(code, place, met, rule))
+            Error::log(code, place, met, rule)
         };
-        if cell.is_empty() {
-            return refuse(
-                "not-finite",
-                "an empty cell".into(),
-                "every sample needs a value; cut the log where it is whole, a value is never made up",
-            );
-        }
-        let parsed = if self.dialect.decimal == ',' && cell.contains(',') {
-            cell.replace(',', ".").parse::<f64>()
-        } else {
-            cell.parse::<f64>()
-        };
-        let Ok(number) = parsed else {
-            let quoted = format!("`{}`", printable(cell));
-            let rule = if cell.contains('\u{2212}') {
-                "this is a typographic minus; write numbers with the sign on the keyboard"
-            } else {
-                "write numbers such as -0.25 or 1.5e-3, without units or thousands marks"
-            };
-            return refuse("not-a-number", quoted, rule);
-        };
+        let number =
+            number(cell, self.dialect).map_err(|(code, met, rule)| refuse(code, met, rule))?;
         let value = number * source.factor;
         if let Some((code, rule)) = objection(quantity, number, value) {
-            return refuse(code, format!("`{}`", printable(cell)), rule);
+            let met = format!("`{}`", printable(cell.trim()));
+            return Err(refuse(code, met, rule));
         }
         Ok(value)
     }

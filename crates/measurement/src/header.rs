@@ -88,7 +88,7 @@ pub(crate) fn meaning(header: &str, joints: &[JointLabel]) -> Meaning {
 }
 
 /// Lower case, `q1 [rad/s]` as `q1_rad/s`.
-fn normalise(header: &str) -> String {
+pub(crate) fn normalise(header: &str) -> String {
     let mut out = String::new();
     for c in header.trim().to_lowercase().chars() {
         let c = match c {

@@ -33,6 +33,7 @@
 //! recording before anything is computed from it. Neither decides how a log is filtered: the caller does, and every
 //! choice is recorded ([`Choice`]).
 
+mod back_emf;
 mod clock;
 mod columns;
 mod conditioning;
@@ -56,7 +57,9 @@ mod motion;
 mod period;
 mod plausibility;
 mod quantity;
+mod sheet;
 
+pub use back_emf::{BackEmf, read_back_emf};
 pub use clock::{Clock, GAP, Gap, interpolate, read_clock, uniform_grid, uniform_interval};
 pub use columns::{NamedColumn, log_from_columns};
 pub use conditioning::{
