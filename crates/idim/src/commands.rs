@@ -11,6 +11,7 @@ use crate::log_spec::LogSpec;
 use crate::logs::{Logs, read_logs};
 use crate::payload::identify_payload;
 use crate::report::warnings_text;
+use crate::same_samples::{LOADED_ALREADY, refuse_same_files, refuse_shared};
 use crate::table::{number, optional, table};
 use crate::torque_constants::torque_constant;
 use clap::Args;
@@ -98,10 +99,17 @@ fn runs(args: &LoadedRuns) -> Result<Runs, Error> {
         },
         ..IdentifyOptions::default()
     };
+    refuse_same_files(
+        &args.loaded,
+        &args.log,
+        "--log and as --loaded",
+        LOADED_ALREADY,
+    )?;
     let mapping = args.reading.mapping()?;
     let waivers = args.reading.waivers(&loaded.robot)?;
     let without = read_logs(&args.log, &loaded, &mapping, waivers)?;
     let with = read_logs(&args.loaded, &loaded, &mapping, waivers)?;
+    refuse_shared(&with.prints(), &without.prints(), "--log", LOADED_ALREADY)?;
     let links = loaded.robot.links();
     let link = match &args.on {
         None => links.len() - 1,

@@ -1,6 +1,6 @@
 //! `idim identify`: a robot from its logs, or the papers reproduced.
 
-use crate::cli::{NamedText, Paper, RobotChanges, file_name, load, say};
+use crate::cli::{NamedText, Paper, RobotChanges, load, say};
 use crate::error::Error;
 use crate::export::exports;
 use crate::fit::EstimationOptions;
@@ -8,11 +8,14 @@ use crate::identify::{IdentifyOptions, identify};
 use crate::log_options::{FittingArgs, ReadingArgs, SamplingArgs, named};
 use crate::log_spec::LogSpec;
 use crate::logs::read_logs;
-use crate::output::{remove_earlier, write_atomically};
+use crate::output::{
+    RESULT_FILES, refuse_overwriting, remove_earlier, results_folder, write_atomically,
+};
 use crate::progress::Progress;
 use crate::report::{identification_text, paper_text, warnings_text};
 use crate::report_html::{file_settings, page_of_logs, shell_line};
 use crate::result::IdentificationResult;
+use crate::same_samples::{PROVED_ON_ITSELF, refuse_same_files, refuse_shared};
 use crate::{crs_a460, plots, puma};
 use clap::{Args, ValueEnum};
 use std::io::Write;
@@ -88,6 +91,16 @@ pub(crate) fn run_identify(args: &IdentifyArgs, out: &mut dyn Write) -> Result<(
     Ok(())
 }
 
+/// Files that are read.
+fn inputs<'a>(args: &'a IdentifyArgs, robot: &'a Path) -> Vec<&'a Path> {
+    let logs = args.log.iter().chain(&args.validate);
+    let files = logs.flat_map(|l| l.files.iter().map(PathBuf::as_path));
+    files
+        .chain([robot])
+        .chain(args.reading.mapping.as_deref())
+        .collect()
+}
+
 /// Papers bring their own robot, data and options.
 fn refuse_beside_a_paper(args: &IdentifyArgs) -> Result<(), Error> {
     let mut given = args.reading.given();
@@ -120,14 +133,17 @@ fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<()
     let progress = Progress::new();
     progress.stage("reading");
     let loaded = load(robot, &args.changes)?;
-    let seen = |l: &&LogSpec| args.validate.iter().any(|v| v.overlaps(l));
-    if let Some(twice) = args.log.iter().find(seen) {
-        return Err(Error::input(
-            twice.name(),
-            "given both as --log and as --validate",
-            "a model is proved on motions it has not seen; give another file, or another range of samples",
-        ));
-    }
+    refuse_same_files(
+        &args.validate,
+        &args.log,
+        "--log and as --validate",
+        PROVED_ON_ITSELF,
+    )?;
+    refuse_overwriting(
+        &results_folder(&args.out, loaded.robot.name()),
+        &RESULT_FILES,
+        &inputs(args, robot),
+    )?;
     let (columns, friction) = args.fitting.model()?;
     let options = IdentifyOptions {
         columns,
@@ -144,6 +160,8 @@ fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<()
     let waivers = args.reading.waivers(&loaded.robot)?;
     let training = read_logs(&args.log, &loaded, &mapping, waivers)?;
     let validation = read_logs(&args.validate, &loaded, &mapping, waivers)?;
+    let seen = training.prints();
+    refuse_shared(&validation.prints(), &seen, "--log", PROVED_ON_ITSELF)?;
     progress.stage("identifying");
     let mut identification = identify(
         &loaded,
@@ -190,7 +208,7 @@ fn write_results(
     page: &str,
     out: &mut dyn Write,
 ) -> Result<(), Error> {
-    let folder = dir.join(file_name(&result.robot));
+    let folder = results_folder(dir, &result.robot);
     let json = serde_json::to_string_pretty(result)
         .map_err(|e| Error::input("result", e.to_string(), "a defect of this program"))?;
     for (name, text) in files {

@@ -38,6 +38,7 @@ pub mod puma;
 pub mod report;
 pub mod report_html;
 mod result;
+mod same_samples;
 mod samples;
 mod sampling_choice;
 pub mod simulate;

@@ -55,12 +55,19 @@ impl LogSpec {
         names.join("+") + &range
     }
 
-    /// Whether two logs share a sample.
+    /// Whether two logs share a sample of a file, by whatever path it is named.
     pub fn overlaps(&self, other: &Self) -> bool {
         let range = |s: &Self| s.samples.clone().unwrap_or(0..usize::MAX);
         let (a, b) = (range(self), range(other));
-        self.files.iter().any(|f| other.files.contains(f)) && a.start < b.end && b.start < a.end
+        let shared = |f: &PathBuf| other.files.iter().any(|g| same_file(f, g));
+        a.start < b.end && b.start < a.end && self.files.iter().any(shared)
     }
+}
+
+/// Whether two paths lead to one file.
+pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
+    let real = |p: &Path| std::fs::canonicalize(p).ok();
+    a == b || real(a).is_some_and(|a| real(b) == Some(a))
 }
 
 fn parse_range(text: &str) -> Result<Range<usize>, String> {

@@ -4,6 +4,7 @@ use crate::check::{CheckedFinding, Waiver, diagnose, gate, marked};
 use crate::error::Error;
 use crate::load::{LoadedRobot, read_text};
 use crate::log_spec::LogSpec;
+use crate::same_samples::{Prints, refuse_repeated};
 use crate::transmission::joint_side;
 use idim_measurement::formats::read_log;
 use idim_measurement::{
@@ -14,6 +15,8 @@ use std::path::{Path, PathBuf};
 /// Logs read and what was noted about them.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Logs {
+    /// As named on the command line.
+    pub(crate) names: Vec<String>,
     pub(crate) measurements: Vec<Measurements>,
     /// How the files were read and what was inferred, for the result's `inferred`.
     pub(crate) inferred: Vec<String>,
@@ -38,6 +41,7 @@ pub(crate) fn read_logs(
         let notes = log.notes.iter();
         logs.inferred
             .extend(notes.map(|n| format!("{}: {n}", spec.name())));
+        logs.names.push(spec.name());
         read.push(log);
     }
     let findings = diagnose(&read, &loaded.robot).into_iter().flatten();
@@ -47,7 +51,18 @@ pub(crate) fn read_logs(
         logs.measurements
             .push(Measurements::from_log(log, &loaded.robot)?);
     }
+    refuse_repeated(&logs.prints())?;
     Ok(logs)
+}
+
+impl Logs {
+    /// What tells the samples of each log from others'.
+    pub(crate) fn prints(&self) -> Vec<Prints<'_>> {
+        let named = self.names.iter().zip(&self.measurements);
+        named
+            .map(|(name, m)| Prints::of_measurements(name, m))
+            .collect()
+    }
 }
 
 /// One log as the command line names it: on the joint side, its clock settled, cut to the samples wanted.

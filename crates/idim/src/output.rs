@@ -1,8 +1,10 @@
 //! Files appear whole or not at all.
 
+use crate::cli::file_name;
 use crate::error::Error;
+use crate::log_spec::same_file;
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Writes a file under a temporary name in its folder and renames it, making the folder first.
 ///
@@ -22,14 +24,48 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Names of files in `model/` that an identification may write.
-const MODEL_FILES: [&str; 5] = [
-    "parameters.yaml",
-    "predictor.rs",
-    "predictor.c",
-    "robot.ron",
-    "robot.urdf",
+/// Names of files that an identification writes to its folder of results and may be handed as an input.
+pub(crate) const RESULT_FILES: [&str; 7] = [
+    "result.json",
+    "report.html",
+    "model/parameters.yaml",
+    "model/predictor.rs",
+    "model/predictor.c",
+    "model/robot.ron",
+    "model/robot.urdf",
 ];
+
+/// The folder of a robot's results.
+pub(crate) fn results_folder(dir: &Path, robot: &str) -> PathBuf {
+    dir.join(file_name(robot))
+}
+
+/// Refuses to write `names` to `folder` where one of them is a file that is read: results never replace what they were made
+/// from. A folder and an empty name stand for a single file.
+///
+/// # Errors
+/// The input, and what to do.
+pub(crate) fn refuse_overwriting(
+    folder: &Path,
+    names: &[&str],
+    inputs: &[&Path],
+) -> Result<(), Error> {
+    for name in names {
+        let written = if name.is_empty() {
+            folder.to_path_buf()
+        } else {
+            folder.join(name)
+        };
+        if let Some(input) = inputs.iter().find(|input| same_file(input, &written)) {
+            return Err(Error::input(
+                format!("--out {}", folder.display()),
+                format!("{} is read, and would be overwritten", input.display()),
+                "choose another --out, or copy the input elsewhere",
+            ));
+        }
+    }
+    Ok(())
+}
 
 /// Removes what an earlier identification left in a folder of results and this one has not `written`: a predictor or a robot
 /// of other values beside a new `result.json` would be taken for its own. Files of other names stay.
@@ -41,7 +77,10 @@ pub(crate) fn remove_earlier(folder: &Path, written: &[&str]) -> Result<(), Erro
     let pictures = pictures
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .filter(|name| is_torque_picture(name));
-    let model = MODEL_FILES.iter().map(|name| format!("model/{name}"));
+    let model = RESULT_FILES
+        .iter()
+        .filter(|name| name.starts_with("model/"));
+    let model = model.map(|name| (*name).to_owned());
     for name in pictures.chain(model) {
         if written.contains(&name.as_str()) {
             continue;

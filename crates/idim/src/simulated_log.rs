@@ -1,9 +1,9 @@
 //! `idim simulate`: the log a robot with known inertia would leave behind, to try things out before there is a real one.
 
-use crate::cli::RobotChanges;
+use crate::cli::{RobotChanges, load, say};
 use crate::error::Error;
-use crate::load::{Changes, load_robot, read_text};
-use crate::output::write_atomically;
+use crate::load::read_text;
+use crate::output::{refuse_overwriting, write_atomically};
 use clap::Args;
 use idim_model::{Joint, JointKind, JointStates, LogSide, Model, Robot, inverse_dynamics_batch};
 use idim_trajectory::{Limits, Motion, TrajectoryFile, random_series};
@@ -61,11 +61,10 @@ const MOST_SAMPLES: f64 = 5e6;
 
 /// Writes the log and says what is in it.
 pub(crate) fn run_simulate(args: &SimulateArgs, out: &mut dyn Write) -> Result<(), Error> {
-    let changes = Changes {
-        gravity: args.changes.gravity,
-        lock: args.changes.lock.clone(),
-    };
-    let robot = load_robot(&args.robot, &changes)?.robot;
+    let mut inputs = vec![args.robot.as_path()];
+    inputs.extend(args.motion.as_deref());
+    refuse_overwriting(&args.out, &[""], &inputs)?;
+    let robot = load(&args.robot, &args.changes)?.robot;
     let samples = args.rate * args.duration;
     if !(args.rate > 0.0 && args.duration > 0.0 && (1.0..=MOST_SAMPLES).contains(&samples)) {
         let met = format!("--rate {} and --duration {}", args.rate, args.duration);
@@ -93,11 +92,7 @@ pub(crate) fn run_simulate(args: &SimulateArgs, out: &mut dyn Write) -> Result<(
         args.duration,
         log.contents,
     );
-    out.write_all(text.as_bytes())
-        .map_err(|source| Error::Write {
-            path: "standard output".into(),
-            source,
-        })
+    say(out, &text)
 }
 
 fn motion(args: &SimulateArgs, robot: &Robot) -> Result<Motion, Error> {

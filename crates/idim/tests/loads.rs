@@ -69,7 +69,12 @@ impl Bench {
         std::fs::write(dir.path().join("arm.ron"), robot_to_ron(&arm)).unwrap();
         std::fs::write(dir.path().join("loaded.ron"), robot_to_ron(&loaded)).unwrap();
         let bench = Self { dir };
-        for (robot, log, seed) in [("arm", "without", "1"), ("loaded", "with", "2")] {
+        let runs = [
+            ("arm", "without", "1"),
+            ("loaded", "with", "2"),
+            ("arm", "again", "3"),
+        ];
+        for (robot, log, seed) in runs {
             let (robot, log) = (
                 bench.path(&format!("{robot}.ron")),
                 bench.path(&format!("{log}.csv")),
@@ -200,19 +205,15 @@ fn identity_drive_gains_are_found_and_rest_on_the_weighed_mass() {
         let ratio = b.unwrap() / a.unwrap();
         assert!((ratio - 1.1).abs() < 1e-6, "{ratio}");
     }
-    // Twice the same runs: no load is felt, and the answer says so.
-    let nothing = json(&[
-        "drive-gains",
-        "--robot",
-        &robot,
-        "--log",
-        &without,
-        "--loaded",
-        &without,
-        "--mass",
-        "3",
-        "--json",
-    ]);
+    // No load in either: none is felt, and the answer says so.
+    let runs = ["drive-gains", "--robot", &robot, "--log", &without];
+    let again = bench.miscounted("again.csv", &gains);
+    let with = |loaded: &str| {
+        let mut all = runs.to_vec();
+        all.extend(["--loaded", loaded, "--mass", "3", "--json"]);
+        run(&all)
+    };
+    let nothing: Value = serde_json::from_str(&with(&again).unwrap()).unwrap();
     let gains = nothing["gains"].as_array().unwrap();
     let told = gains.iter().filter(|g| g.as_f64().is_some()).count();
     let said = nothing["warnings"].to_string();
@@ -220,6 +221,8 @@ fn identity_drive_gains_are_found_and_rest_on_the_weighed_mass() {
         told == 0 || said.contains("separable") || said.contains("validity"),
         "{nothing:#}"
     );
+    let same = with(&without).unwrap_err();
+    assert!(same.contains("--log and as --loaded"), "{same}");
 }
 
 #[test]

@@ -8,6 +8,7 @@ use crate::log_options::ReadingArgs;
 use crate::log_spec::LogSpec;
 use crate::logs::read_log_spec;
 use crate::progress::Progress;
+use crate::same_samples::{Prints, refuse_repeated};
 use clap::Args;
 use idim_measurement::Log;
 use idim_measurement::doctor::Finding;
@@ -45,6 +46,12 @@ pub(crate) fn run_check(args: &CheckArgs, out: &mut dyn Write) -> Result<(), Err
         progress.stage(format!("reading {}", spec.name()));
         read.push((spec.name(), read_log_spec(spec, &loaded, &mapping)));
     }
+    let prints: Vec<Prints<'_>> = read
+        .iter()
+        .filter_map(|(name, log)| Some(Prints::of_log(name, log.as_ref().ok()?)))
+        .collect();
+    refuse_repeated(&prints)?;
+    drop(prints);
     progress.stage("examining");
     let logs = examined(read, &loaded, waivers)?;
     progress.finish();

@@ -2,7 +2,7 @@
 
 use super::certificate_file::certificate_json;
 use super::conditions::conditions;
-use super::files::{files, write};
+use super::files::{FILES, files, write};
 use super::interrupt::Watch;
 use super::limits::{GivenLimits, for_joints, motion_limits};
 use super::points::{PointOptions, excite_points};
@@ -15,6 +15,7 @@ use crate::error::Error;
 use crate::load::LoadedRobot;
 use crate::log_spec::LogSpec;
 use crate::logs::{read_logs, read_mapping};
+use crate::output::{refuse_overwriting, results_folder};
 use crate::plots;
 use crate::progress::Progress;
 use crate::report::warnings_text;
@@ -181,6 +182,9 @@ pub(crate) fn run_excite(args: &ExciteArgs, out: &mut dyn Write) -> Result<(), E
     progress.stage("reading");
     let loaded = load(&args.robot, &args.changes)?;
     let robot = &loaded.robot;
+    let logs = args.log.iter().flat_map(|l| &l.files);
+    let inputs: Vec<&Path> = logs.chain([&args.robot]).map(PathBuf::as_path).collect();
+    refuse_overwriting(&results_folder(&args.out, robot.name()), &FILES, &inputs)?;
     let given = GivenLimits {
         position: &args.position,
         velocity: &args.velocity,

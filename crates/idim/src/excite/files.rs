@@ -1,14 +1,22 @@
 //! What a design leaves behind: the motion in three forms, its certificate, its picture.
 
-use crate::cli::{NamedText, file_name, say};
+use crate::cli::{NamedText, say};
 use crate::error::Error;
-use crate::output::write_atomically;
+use crate::output::{results_folder, write_atomically};
 use idim_model::{JointStates, Robot};
 use idim_trajectory::{Motion, TrajectoryFile};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;
+
+/// Files that a design writes and may be handed as an input.
+pub(super) const FILES: [&str; 4] = [
+    "motion.ron",
+    "motion.json",
+    "samples.csv",
+    "certificate.json",
+];
 
 /// The files of a motion of some duration, s: names and texts.
 pub(super) fn files(
@@ -66,7 +74,7 @@ pub(super) fn write(
     files: &[NamedText],
     out: &mut dyn Write,
 ) -> Result<(), Error> {
-    let folder = dir.join(file_name(robot.name()));
+    let folder = results_folder(dir, robot.name());
     for (name, text) in files {
         write_atomically(&folder.join(name), text.as_bytes())?;
     }
