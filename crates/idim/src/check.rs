@@ -170,6 +170,17 @@ pub fn marked(findings: Vec<Finding>, waivers: &[Waiver]) -> Vec<CheckedFinding>
     findings.into_iter().map(mark).collect()
 }
 
+/// Whether a finding doubts what a torque is worth: its unit, its sign, the side of the gear it stands on.
+pub(crate) fn doubts_a_torque(finding: &Finding) -> bool {
+    match finding.code {
+        "torque-sign" | "torque-unit" | "torque-is-current" | "torque-scale" | "torque-range" => {
+            true
+        }
+        "gear-side" => finding.met.contains("torque"),
+        _ => false,
+    }
+}
+
 /// Refuses to go on with findings that would spoil the result.
 ///
 /// # Errors

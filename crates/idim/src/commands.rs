@@ -1,5 +1,6 @@
 //! Commands beside `identify`: loads, drive gains, torque constants.
 
+use crate::check::doubts_a_torque;
 use crate::cli::{RobotChanges, load, say};
 use crate::drive_gains::drive_gains;
 use crate::error::Error;
@@ -8,7 +9,7 @@ use crate::identify::{Identification, IdentifyOptions, identify};
 use crate::load::LoadedRobot;
 use crate::log_options::{FittingArgs, ReadingArgs, SamplingArgs};
 use crate::log_spec::LogSpec;
-use crate::logs::{Logs, read_logs};
+use crate::logs::{Logs, read_logs_despite};
 use crate::payload::identify_payload;
 use crate::report::warnings_text;
 use crate::same_samples::{LOADED_ALREADY, refuse_same_files, refuse_shared};
@@ -85,6 +86,21 @@ struct Runs {
     estimation: EstimationOptions,
 }
 
+impl Runs {
+    /// What the doctor doubts of the logs.
+    fn doubts(&self) -> impl Iterator<Item = String> {
+        let findings = self.without.findings.iter().chain(&self.with.findings);
+        let doubts = findings.filter(|f| f.is_doubt());
+        doubts.map(|f| f.finding.to_string())
+    }
+
+    /// How the logs were read.
+    fn inferred(&self) -> impl Iterator<Item = String> {
+        let all = self.without.inferred.iter().chain(&self.with.inferred);
+        all.cloned()
+    }
+}
+
 fn runs(args: &LoadedRuns) -> Result<Runs, Error> {
     let loaded = load(&args.robot, &args.changes)?;
     let (columns, friction) = args.fitting.model()?;
@@ -107,8 +123,8 @@ fn runs(args: &LoadedRuns) -> Result<Runs, Error> {
     )?;
     let mapping = args.reading.mapping()?;
     let waivers = args.reading.waivers(&loaded.robot)?;
-    let without = read_logs(&args.log, &loaded, &mapping, waivers)?;
-    let with = read_logs(&args.loaded, &loaded, &mapping, waivers)?;
+    let without = read_logs_despite(&args.log, &loaded, &mapping, waivers, doubts_a_torque)?;
+    let with = read_logs_despite(&args.loaded, &loaded, &mapping, waivers, doubts_a_torque)?;
     refuse_shared(&with.prints(), &without.prints(), "--log", LOADED_ALREADY)?;
     let links = loaded.robot.links();
     let link = match &args.on {
@@ -149,6 +165,8 @@ pub(crate) fn payload(args: &LoadedRuns, out: &mut dyn Write) -> Result<(), Erro
         runs.link,
         &runs.estimation,
     )?;
+    let mut notes = runs.arm.result.warnings.clone();
+    notes.extend(runs.doubts());
     if args.json {
         let parameters: Vec<_> = (0..found.names.len())
             .map(|k| {
@@ -165,6 +183,7 @@ pub(crate) fn payload(args: &LoadedRuns, out: &mut dyn Write) -> Result<(), Erro
             "link": runs.loaded.robot.links()[runs.link].name,
             "parameters": parameters,
             "noise": found.noise,
+            "warnings": notes,
         });
         return say(out, &format!("{json:#}\n"));
     }
@@ -198,14 +217,7 @@ pub(crate) fn payload(args: &LoadedRuns, out: &mut dyn Write) -> Result<(), Erro
             number(found.values[z] / mass),
         );
     }
-    let mut notes = runs.arm.result.warnings.clone();
-    notes.extend(
-        runs.without
-            .inferred
-            .iter()
-            .chain(&runs.with.inferred)
-            .cloned(),
-    );
+    notes.extend(runs.inferred());
     say(out, &(text + &warnings_text(&notes)))
 }
 
@@ -236,6 +248,8 @@ pub(crate) fn run_drive_gains(args: &DriveGainsArgs, out: &mut dyn Write) -> Res
         runs.link,
         args.mass,
     )?;
+    let mut notes = found.warnings;
+    notes.extend(runs.doubts());
     if args.runs.json {
         let json = serde_json::json!({
             "schema": "idim-drive-gains/1",
@@ -243,7 +257,7 @@ pub(crate) fn run_drive_gains(args: &DriveGainsArgs, out: &mut dyn Write) -> Res
             "gains": found.gains,
             "std": found.standard_deviation,
             "validity": found.validity,
-            "warnings": found.warnings,
+            "warnings": notes,
         });
         return say(out, &format!("{json:#}\n"));
     }
@@ -259,14 +273,7 @@ pub(crate) fn run_drive_gains(args: &DriveGainsArgs, out: &mut dyn Write) -> Res
         table(["joint", "gain", "std"], rows),
         optional(found.validity),
     );
-    let mut notes = found.warnings;
-    notes.extend(
-        runs.without
-            .inferred
-            .iter()
-            .chain(&runs.with.inferred)
-            .cloned(),
-    );
+    notes.extend(runs.inferred());
     say(out, &(text + &warnings_text(&notes)))
 }
 

@@ -6,6 +6,7 @@ use crate::load::{LoadedRobot, read_text};
 use crate::log_spec::LogSpec;
 use crate::same_samples::{Prints, refuse_repeated};
 use crate::transmission::joint_side;
+use idim_measurement::doctor::Finding;
 use idim_measurement::formats::read_log;
 use idim_measurement::{
     ColumnMapping, JointLabel, Log, Measurements, infer_time_unit, joint_labels, read_csv_files,
@@ -34,6 +35,17 @@ pub(crate) fn read_logs(
     mapping: &ColumnMapping,
     waivers: &[Waiver],
 ) -> Result<Logs, Error> {
+    read_logs_despite(specs, loaded, mapping, waivers, |_| false)
+}
+
+/// As [`read_logs`], where some findings do not stop the run: they are what it is to find out.
+pub(crate) fn read_logs_despite(
+    specs: &[LogSpec],
+    loaded: &LoadedRobot,
+    mapping: &ColumnMapping,
+    waivers: &[Waiver],
+    asked_for: fn(&Finding) -> bool,
+) -> Result<Logs, Error> {
     let mut logs = Logs::default();
     let mut read = Vec::new();
     for spec in specs {
@@ -46,6 +58,9 @@ pub(crate) fn read_logs(
     }
     let findings = diagnose(&read, &loaded.robot).into_iter().flatten();
     logs.findings = marked(findings.collect(), waivers);
+    for f in &mut logs.findings {
+        f.blocks &= !asked_for(&f.finding);
+    }
     gate(&logs.findings)?;
     for log in &read {
         logs.measurements

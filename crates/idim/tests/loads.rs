@@ -18,9 +18,7 @@ struct Arguments {
 }
 
 fn run(arguments: &[&str]) -> Result<String, String> {
-    let loaded = ["payload", "drive-gains"].contains(&arguments[0]);
-    let waived = if loaded { &WAIVED[..] } else { &[] };
-    let all = ["idim"].iter().chain(arguments).chain(waived);
+    let all = ["idim"].iter().chain(arguments);
     let parsed = Arguments::try_parse_from(all).map_err(|e| e.to_string())?;
     let mut out = Vec::new();
     idim::cli::run(&parsed.command, &mut out).map_err(|e| e.to_string())?;
@@ -30,18 +28,6 @@ fn run(arguments: &[&str]) -> Result<String, String> {
 fn json(arguments: &[&str]) -> Value {
     serde_json::from_str(&run(arguments).unwrap()).unwrap()
 }
-
-/// What the doctor suspects of simulated torques, rightly where gains are wrong.
-const WAIVED: [&str; 8] = [
-    "--waive",
-    "gear-side",
-    "--waive",
-    "degrees",
-    "--waive",
-    "torque-sign",
-    "--waive",
-    "position-sign",
-];
 
 const MASS: f64 = 3.0;
 const CENTRE: [f64; 3] = [0.03, -0.02, 0.12];
@@ -162,6 +148,31 @@ fn identity_a_load_is_found_within_its_uncertainty() {
     ])
     .unwrap();
     assert!(text.contains("centre of mass"), "{text}");
+    // The arm's friction and the weights of the rows are chosen as for `identify`.
+    let robust = run(&[
+        "payload",
+        "--robot",
+        &robot,
+        "--log",
+        &without,
+        "--loaded",
+        &with,
+        "--robust",
+        "tukey",
+        "--weighting",
+        "diagonal",
+        "--friction",
+        "viscous,coulomb",
+        "--dead-band",
+        "0.1",
+        "--rate",
+        "50",
+    ])
+    .unwrap();
+    assert!(
+        robust.contains("centre of mass") && robust != text,
+        "{robust}"
+    );
 }
 
 #[test]
@@ -223,6 +234,57 @@ fn identity_drive_gains_are_found_and_rest_on_the_weighed_mass() {
     );
     let same = with(&without).unwrap_err();
     assert!(same.contains("--log and as --loaded"), "{same}");
+}
+
+#[test]
+fn identity_gains_are_asked_for_whatever_the_doctor_doubts_of_torques_and_of_nothing_else() {
+    let bench = Bench::new();
+    let robot = bench.path("arm.ron");
+    // A drive that is turned: what the command is to find.
+    let gains = [1.0, -1.0, 1.0, 1.0, 1.0, 1.0];
+    let [without, with] = ["without.csv", "with.csv"].map(|log| bench.miscounted(log, &gains));
+    let runs = |without: &str, with: &str| {
+        let words = [
+            "--robot", &robot, "--log", without, "--loaded", with, "--json",
+        ];
+        words.map(str::to_owned).to_vec()
+    };
+    let found = |all: &[String], command: &[&str]| {
+        let words: Vec<&str> = command
+            .iter()
+            .copied()
+            .chain(all.iter().map(String::as_str))
+            .collect();
+        run(&words)
+    };
+    let all = runs(&without, &with);
+    let answer: Value =
+        serde_json::from_str(&found(&all, &["drive-gains", "--mass", "3"]).unwrap()).unwrap();
+    let gain = answer["gains"][1].as_f64().unwrap();
+    assert!((gain + 1.0).abs() < 0.1, "{answer:#}");
+    assert!(
+        answer["warnings"].to_string().contains("torque-sign"),
+        "{answer:#}"
+    );
+    // Positions in degrees still stop it.
+    let text = std::fs::read_to_string(bench.path("without.csv")).unwrap();
+    let degrees = bench.path("degrees.csv");
+    let header = text.lines().next().unwrap();
+    let at = header.split(',').position(|h| h.starts_with("q3")).unwrap();
+    let mut out = header.to_owned() + "\n";
+    for line in text.lines().skip(1) {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        cells[at] = cells[at].parse::<f64>().unwrap().to_degrees().to_string();
+        out += &(cells.join(",") + "\n");
+    }
+    std::fs::write(&degrees, out).unwrap();
+    for command in [&["payload"][..], &["drive-gains", "--mass", "3"]] {
+        let refused = found(&runs(&degrees, &bench.path("with.csv")), command).unwrap_err();
+        assert!(
+            refused.contains("degrees") || refused.contains("position"),
+            "{refused}"
+        );
+    }
 }
 
 #[test]

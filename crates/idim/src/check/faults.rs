@@ -37,6 +37,8 @@ pub(crate) enum Fault {
 
 /// Complexity of a fault that is of the robot's description rather than of a column.
 pub(crate) const OF_THE_ROBOT: f64 = 3.0;
+/// How findings about torques begin; those about positions begin otherwise.
+pub(crate) const OF_TORQUES: &str = "the torque";
 /// Rule of everything the rigid body betrays.
 const RULE: &str = "the joints share masses and inertias, so their torques must agree about them";
 
@@ -157,7 +159,7 @@ impl Fault {
                 "torque-sign",
                 at(j),
                 -1.0,
-                format!("the torque has the wrong sign; turned, {better}"),
+                format!("{OF_TORQUES} has the wrong sign; turned, {better}"),
                 "change the sign of this joint's torque".into(),
             )],
             Self::PositionSign(j) => vec![finding(
@@ -202,7 +204,7 @@ impl Fault {
                 code,
                 meaning,
                 ..
-            } => vec![factor("the torque", joint, recorded, code, meaning)],
+            } => vec![factor(OF_TORQUES, joint, recorded, code, meaning)],
             Self::PositionFactor {
                 joint,
                 recorded,
