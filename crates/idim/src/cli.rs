@@ -3,7 +3,7 @@
 use crate::check::{CheckArgs, run_check};
 use crate::commands::{self, DriveGainsArgs, LoadedRuns, TorqueConstantsArgs};
 use crate::error::Error;
-use crate::excite::{ExciteArgs, INTERRUPTED_CODE, run_excite};
+use crate::excite::{ExciteArgs, run_excite};
 use crate::identify_command::{IdentifyArgs, run_identify};
 use crate::load::{Changes, LoadedRobot, load_robot};
 use crate::report::{reduction_text, warnings_text};
@@ -156,12 +156,25 @@ pub(crate) fn file_name(name: &str) -> String {
     }
 }
 
+/// Writes text for a person; whatever a file brought in, it moves no cursor and changes no colour.
 pub(crate) fn say(out: &mut dyn Write, text: &str) -> Result<(), Error> {
-    out.write_all(text.as_bytes())
+    out.write_all(printable(text).as_bytes())
         .map_err(|source| Error::Write {
             path: "standard output".into(),
             source,
         })
+}
+
+/// Text with control characters other than line ends replaced: names come from files.
+pub(crate) fn printable(text: &str) -> String {
+    let shown = |c: char| {
+        if c.is_control() && c != '\n' {
+            '\u{fffd}'
+        } else {
+            c
+        }
+    };
+    text.chars().map(shown).collect()
 }
 
 pub(crate) fn drive_columns(chosen: Option<&[Column]>) -> DriveColumns {
@@ -199,15 +212,33 @@ fn parse_lock(text: &str) -> Result<(String, f64), String> {
 }
 
 /// Runs a command for a process: text to standard output, an error to standard error, an exit code.
+///
+/// A reader that has gone, as `head` does, is no failure: results are written all the same.
 pub fn main(command: &Command) -> ExitCode {
-    match run(command, &mut std::io::stdout().lock()) {
+    match run(command, &mut UntilClosed(std::io::stdout().lock())) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
-            match error {
-                Error::Interrupted => ExitCode::from(INTERRUPTED_CODE),
-                _ => ExitCode::FAILURE,
-            }
+            eprintln!("error: {}", printable(&error.to_string()));
+            error.exit_code()
+        }
+    }
+}
+
+/// Writes as long as somebody reads, and lets go of the rest.
+struct UntilClosed<W>(W);
+
+impl<W: Write> Write for UntilClosed<W> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match self.0.write(bytes) {
+            Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(bytes.len()),
+            other => other,
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        match self.0.flush() {
+            Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+            other => other,
         }
     }
 }

@@ -1,6 +1,8 @@
 //! What stops a run.
 
+use crate::excite::INTERRUPTED_CODE;
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 /// A run that cannot go on, with what to do next.
 #[derive(Debug, thiserror::Error)]
@@ -67,6 +69,12 @@ pub enum Error {
     /// Ctrl-C came before there was anything to return.
     #[error("interrupted before any motion was certified; nothing is written")]
     Interrupted,
+    /// Everything was written, and `--strict` asked for more than the verdict gives.
+    #[error("{verdict}; the results are written, --strict makes this an error")]
+    Distrusted {
+        /// The verdict of the report.
+        verdict: String,
+    },
     /// A rule of the command line or of a file that only this crate knows.
     #[error("{place}: {met}; {rule}")]
     Input {
@@ -79,7 +87,19 @@ pub enum Error {
     },
 }
 
+/// Exit code where the verdict is not what `--strict` asks for; 2 is that of a command line that cannot be read.
+const DISTRUSTED: u8 = 3;
+
 impl Error {
+    /// What a process says of it: 1, and 3 for a result that `--strict` does not trust.
+    pub(crate) fn exit_code(&self) -> ExitCode {
+        match self {
+            Self::Distrusted { .. } => ExitCode::from(DISTRUSTED),
+            Self::Interrupted => ExitCode::from(INTERRUPTED_CODE),
+            _ => ExitCode::FAILURE,
+        }
+    }
+
     pub(crate) fn input(
         place: impl Into<String>,
         met: impl Into<String>,

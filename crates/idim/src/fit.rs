@@ -59,11 +59,48 @@ pub(crate) fn fit(
         push_rows(&mut rows, robot, columns, stretch, plan)?;
     }
     let n = robot.n_joints();
+    enough(&rows, columns.len(), n, train, plan)?;
     match solved(&rows, n, options)? {
         Some(solved) if options.essential => essential(&solved, columns, names, &rows, n, options),
         Some(solved) => Ok(solved.fit(columns.clone(), names, &rows, n)),
         None => excited(columns, names, &rows, n, options),
     }
+}
+
+/// Refuses rows that are fewer than the parameters, with what became of the samples.
+fn enough(
+    rows: &Rows,
+    n_columns: usize,
+    n_joints: usize,
+    train: &[Stretch],
+    plan: &SamplingPlan,
+) -> Result<(), Error> {
+    let used = rows.used.iter().filter(|u| **u).count();
+    if used >= n_columns {
+        return Ok(());
+    }
+    let samples: usize = train.iter().map(|s| s.states.n_samples()).sum();
+    let kept = rows.y.len() / n_joints;
+    let mut logs: Vec<&str> = train.iter().map(|s| s.file.as_str()).collect();
+    logs.dedup();
+    let rate = match plan.parallel {
+        Some(_) => "a higher --rate or --cutoff keeps more of them, ",
+        None => "",
+    };
+    let slow = if used < rows.y.len() {
+        "a smaller --dead-band keeps slower ones, "
+    } else {
+        ""
+    };
+    Err(Error::input(
+        logs.join(" + "),
+        format!(
+            "{used} rows for {n_columns} parameters: {samples} samples in {} stretches, {kept} of them after the parallel decimation ({n_joints} rows each), {} rows left out as too slow or saturated",
+            train.len(),
+            rows.y.len() - used
+        ),
+        format!("a fit needs more rows than parameters; {rate}{slow}or record a longer motion"),
+    ))
 }
 
 /// A fit of all columns, and how it was made.

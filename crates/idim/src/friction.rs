@@ -39,8 +39,7 @@ pub struct JointFriction {
 }
 
 /// Words a friction list may hold.
-const WORDS: &str =
-    "viscous, coulomb, offset, asymmetric, cubic, root, stribeck[:SPEED], load, tanh:SPEED, none";
+const WORDS: &str = "viscous, coulomb, offset, asymmetric, cubic, root, stribeck[:SPEED], load, tanh:SPEED (rad/s or m/s), none";
 
 /// Reads `auto`, or `[JOINT=]TERM,TERM,..`.
 ///
@@ -60,11 +59,41 @@ pub fn parse_friction(texts: &[String]) -> Result<FrictionChoice, String> {
             None => Ok((None, parse_terms(text)?)),
         })
         .collect();
-    Ok(FrictionChoice::Fixed(fixed?))
+    let fixed = fixed?;
+    for (k, (joint, _)) in fixed.iter().enumerate() {
+        if fixed[..k].iter().any(|(before, _)| before == joint) {
+            let whose = joint.as_deref().unwrap_or("all other joints");
+            return Err(format!(
+                "the friction of {whose} is given twice; write its terms in one list"
+            ));
+        }
+    }
+    Ok(FrictionChoice::Fixed(fixed))
 }
 
 fn parse_terms(list: &str) -> Result<JointFriction, String> {
     let mut friction = JointFriction::default();
+    let names: Vec<&str> = list
+        .split(',')
+        .map(|w| w.split(':').next().unwrap_or(w).trim())
+        .collect();
+    for (k, name) in names.iter().enumerate() {
+        if names[..k].contains(name) {
+            return Err(format!(
+                "`{name}` stands twice in `{list}`; write each term once"
+            ));
+        }
+        if *name == "none" && names.len() > 1 {
+            return Err(format!(
+                "`none` beside others in `{list}`; leave it out, or write it alone"
+            ));
+        }
+        if *name == "auto" {
+            return Err(format!(
+                "`auto` in `{list}` is of all joints; write --friction auto, alone"
+            ));
+        }
+    }
     for word in list.split(',').map(str::trim) {
         let (word, speed) = match word.split_once(':') {
             Some((word, speed)) => {

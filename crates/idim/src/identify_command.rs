@@ -13,7 +13,7 @@ use crate::output::{
 };
 use crate::progress::Progress;
 use crate::report::{identification_text, paper_text, warnings_text};
-use crate::report_html::{file_settings, page_of_logs, shell_line};
+use crate::report_html::{file_settings, page_of_logs, shell_line, verdict_line};
 use crate::result::IdentificationResult;
 use crate::same_samples::{PROVED_ON_ITSELF, refuse_same_files, refuse_shared};
 use crate::{crs_a460, plots, puma};
@@ -57,6 +57,9 @@ pub struct IdentifyArgs {
     /// Keep only the parameters that the residual would miss; the others are listed with their interval.
     #[arg(long)]
     pub essential: bool,
+    /// End with exit code 3 where the verdict is "Not to be trusted" or "Not proved"; results are written all the same.
+    #[arg(long)]
+    pub strict: bool,
 }
 
 /// Does what was asked; results go to `--out`.
@@ -108,6 +111,7 @@ fn refuse_beside_a_paper(args: &IdentifyArgs) -> Result<(), Error> {
     given.extend(args.fitting.given());
     given.extend(named(&[
         ("--essential", args.essential),
+        ("--strict", args.strict),
         ("--gravity", args.changes.gravity.is_some()),
         ("--lock", !args.changes.lock.is_empty()),
     ]));
@@ -190,7 +194,11 @@ fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<()
     files.extend(exports(&identification, &loaded.robot));
     progress.finish();
     say(out, &identification_text(&identification))?;
-    write_results(&args.out, &identification.result, &files, &page, out)
+    write_results(&args.out, &identification.result, &files, &page, out)?;
+    match verdict_line(&identification.result) {
+        (verdict, false) if args.strict => Err(Error::Distrusted { verdict }),
+        _ => Ok(()),
+    }
 }
 
 /// What was typed, under the program's own name.

@@ -140,7 +140,7 @@ pub struct FittingArgs {
     #[arg(
         long,
         value_name = "TERMS",
-        help = "Friction terms: auto, or [JOINT=]viscous,coulomb,offset,asymmetric,cubic,root,stribeck[:SPEED],load,tanh:SPEED; may be repeated"
+        help = "Friction terms: auto, or [JOINT=]viscous,coulomb,offset,asymmetric,cubic,root,stribeck[:SPEED],load,tanh:SPEED, or none; speeds in rad/s (m/s); once for all joints and once for each of its own"
     )]
     pub friction: Vec<String>,
     /// Weights: the joints' full residual covariance, or one variance a joint (default: full).

@@ -1,5 +1,6 @@
 //! A line of progress for a person who waits; nothing when piped.
 
+use crate::cli::printable;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal as _;
 use std::time::Duration;
@@ -30,7 +31,7 @@ impl Progress {
     /// What goes on now.
     pub fn stage(&self, what: impl Into<String>) {
         if let Some(bar) = &self.0 {
-            bar.set_message(what.into());
+            bar.set_message(printable(&what.into()));
         }
     }
 

@@ -1,6 +1,7 @@
 //! What a person reads first: tables on the terminal.
 
 use crate::identify::Identification;
+use crate::report_html::verdict_line;
 use crate::result::{
     ErrorResult, EstimateResult, FrictionResult, FrictionTrial, IdentificationResult, PaperNumber,
     ReductionResult,
@@ -49,6 +50,7 @@ pub fn identification_text(identification: &Identification) -> String {
     out += &errors_text(r);
     out += &baselines_text(r);
     out += &warnings_text(&r.warnings);
+    let _ = writeln!(out, "\nVerdict: {}", verdict_line(r).0);
     out
 }
 

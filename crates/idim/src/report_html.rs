@@ -20,6 +20,7 @@ pub(crate) use fill::{file_settings, page_of_logs, page_of_paper, shell_line, su
 
 use askama::Template;
 use blocks::{Block, Chapter};
+pub(crate) use verdict::verdict_line;
 use verdict::{PlainVerdict, verdict};
 
 const STYLE: &str = include_str!("report_html/report.css");

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::plan::{PASS_BAND, Parallel, SamplingPlan};
 use idim_measurement::{Choice, ConditioningOptions, Decimator, LowPass, Measurements, condition};
 use idim_model::{
-    Columns, JointStates, Model, Parameter, ParameterKind, Robot, visit_torque_regressor,
+    Columns, JointStates, Model, Notation, Parameter, ParameterKind, Robot, visit_torque_regressor,
 };
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 
@@ -108,8 +108,9 @@ pub(crate) fn stated_stretches(
     let (mut all, mut said) = (Vec::new(), Vec::new());
     for log in logs {
         let (stretches, choices) = conditioned(log, plan)?;
+        let short = too_short(&stretches, plan)?;
         all.extend(stretches);
-        let own: Vec<String> = choices
+        let mut own: Vec<String> = choices
             .iter()
             .filter(|c| OF_THE_CLOCK.contains(&c.what))
             .map(|c| {
@@ -118,11 +119,36 @@ pub(crate) fn stated_stretches(
                 format!("{} {value}{space}{} ({})", c.what, c.unit, c.why)
             })
             .collect();
+        own.extend(short);
         if !own.is_empty() {
             said.push(format!("{}: {}", log.file, own.join("; ")));
         }
     }
     Ok((all, said))
+}
+
+/// The stretches that the parallel decimation leaves nothing of, in a sentence.
+fn too_short(stretches: &[Stretch], plan: &SamplingPlan) -> Result<Option<String>, Error> {
+    let mut longest = 0.0_f64;
+    let (mut count, mut needed) = (0, 0.0);
+    for stretch in stretches {
+        let (n, fewest) = (
+            stretch.states.n_samples(),
+            decimator(stretch, plan)?.fewest_samples(),
+        );
+        if n < fewest {
+            let interval = median_interval(&stretch.time);
+            count += 1;
+            longest = longest.max(n as f64 * interval);
+            needed = fewest as f64 * interval;
+        }
+    }
+    Ok((count > 0).then(|| {
+        format!(
+            "stretches too short for the parallel decimation {count} of {} (left out of the fit: at most {longest:.3} s long, where {needed:.3} s are needed)",
+            stretches.len()
+        )
+    }))
 }
 
 /// Choices that differ from log to log; the plan states the others.
@@ -193,7 +219,9 @@ pub(crate) fn push_rows(
                 return Err(Error::input(
                     format!("{} at t = {} s", stretch.file, stretch.time[sample]),
                     format!(
-                        "column {c} of joint {joint} has no value at q = {}",
+                        "{} of {} has no value at q = {}",
+                        columns.names(Notation::Gautier)[c],
+                        robot.joints()[joint].name,
                         stretch.states.q(joint)[sample]
                     ),
                     "a known torque's formula must have a value wherever the joint moves",

@@ -17,8 +17,12 @@ const HOSTILE: &str = "</script><script>document.title='pwned'</script><img src=
 /// A planar arm whose second joint has that name.
 fn robot() -> Robot {
     let quoted = format!("{HOSTILE:?}");
-    robot_from_ron(&idim_fixtures::PLANAR2R.replace("\"elbow\"", &quoted)).unwrap()
+    let robot = robot_from_ron(&idim_fixtures::PLANAR2R.replace("\"elbow\"", &quoted)).unwrap();
+    robot.with_notes([NOTE.to_owned()])
 }
+
+/// What the robot file makes one wonder about.
+const NOTE: &str = "the shoulder of this file is an odd one";
 
 /// Two joints swinging at incommensurate rates, with friction and a ripple that no parameter explains.
 fn log(robot: &Robot, file: &str) -> Measurements {
@@ -183,6 +187,7 @@ fn regress_what_was_tried_and_left_out_is_shown() {
     ] {
         assert!(page.contains(words), "`{words}` is not in the page");
     }
+    assert_eq!(page.matches(NOTE).count(), 1, "a note is said once");
 }
 
 #[test]

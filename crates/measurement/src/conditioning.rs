@@ -129,14 +129,14 @@ pub fn condition(
         });
     }
     let mut segments = Vec::new();
-    let mut dropped = 0;
+    let mut dropped = Vec::new();
     let mut resampled = false;
     for range in clock.segments(n) {
         let length = range.len();
         let part = measured.slice(range);
         match plan.segment(&part, &mut resampled) {
             Some(segment) => segments.push(segment),
-            None => dropped += length,
+            None => dropped.push(length),
         }
     }
     if segments.is_empty() {
@@ -158,12 +158,17 @@ pub fn condition(
             why: "cubic through the four nearest stamps".into(),
         });
     }
-    if dropped > 0 {
+    if let Some(longest) = dropped.iter().max() {
         choices.push(Choice {
             what: "samples in segments too short to filter",
-            value: dropped as f64,
+            value: dropped.iter().sum::<usize>() as f64,
             unit: "",
-            why: "left out".into(),
+            why: format!(
+                "left out: {} segments of at most {longest} samples ({:.3} s), where filter and edges take {}",
+                dropped.len(),
+                *longest as f64 * plan.interval,
+                plan.fewest()
+            ),
         });
     }
     Ok(Conditioned { segments, choices })

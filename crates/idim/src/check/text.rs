@@ -31,13 +31,13 @@ fn count(result: &CheckResult, severity: Severity) -> usize {
 }
 
 fn log_text(robot: &str, log: &CheckedLog) -> String {
-    let mut out = format!("{}, a log of {robot}", printable(&log.log));
+    let mut out = format!("{}, a log of {robot}", log.log);
     if log.n_samples > 0 {
         let _ = write!(out, ": {} samples, {:.3} s", log.n_samples, log.duration_s);
     }
     out.push('\n');
     for statement in &log.inferred {
-        let _ = writeln!(out, "  {}", printable(statement));
+        let _ = writeln!(out, "  {statement}");
     }
     out.push('\n');
     let rows = log.findings.iter().map(|f| {
@@ -50,10 +50,13 @@ fn log_text(robot: &str, log: &CheckedLog) -> String {
         [
             weight(f).to_owned(),
             f.finding.code.to_owned(),
-            place.joint.as_deref().map_or_else(|| "-".into(), printable),
+            place
+                .joint
+                .as_deref()
+                .map_or_else(|| "-".into(), str::to_owned),
             at,
             f.finding.value.map_or_else(|| "-".into(), number),
-            printable(&f.finding.met),
+            f.finding.met.clone(),
         ]
     });
     out += &aligned(["", "code", "joint", "where", "value", "found"], rows, [4]);
@@ -67,16 +70,16 @@ fn log_text(robot: &str, log: &CheckedLog) -> String {
     }
     for f in steps {
         let joint = f.finding.place.joint.as_deref();
-        let whose = joint.map_or_else(String::new, |j| format!(":{}", printable(j)));
+        let whose = joint.map_or_else(String::new, |j| format!(":{j}"));
         let _ = writeln!(
             out,
             "  {}{whose}: {}{}",
             f.finding.code,
-            printable(&f.finding.next_step),
+            f.finding.next_step,
             if f.finding.rule.is_empty() {
                 String::new()
             } else {
-                format!(" ({})", printable(&f.finding.rule))
+                format!(" ({})", f.finding.rule)
             }
         );
     }
@@ -92,11 +95,4 @@ fn weight(f: &CheckedFinding) -> &'static str {
         Severity::Warning => "warning",
         Severity::Note => "note",
     }
-}
-
-/// Names of joints and files come from files: nothing in them moves the cursor.
-fn printable(text: &str) -> String {
-    text.chars()
-        .map(|c| if c.is_control() { '\u{fffd}' } else { c })
-        .collect()
 }

@@ -233,8 +233,12 @@ pub(super) fn robot(data: &ReportData) -> Vec<Block> {
         )),
         Block::table("Joints and links", header, rows.collect()),
     ];
-    if !data.robot.notes().is_empty() {
-        blocks.push(Block::List(data.robot.notes().to_vec()));
+    // What the result warns of is said at the top.
+    let said = &data.result.warnings;
+    let notes = data.robot.notes().iter().filter(|n| !said.contains(n));
+    let notes: Vec<String> = notes.cloned().collect();
+    if !notes.is_empty() {
+        blocks.push(Block::List(notes));
     }
     blocks
 }

@@ -47,22 +47,34 @@ impl PlainVerdict {
     }
 }
 
+/// The verdict on a model identified from logs in a line, and whether the model is to be trusted at all.
+pub(crate) fn verdict_line(result: &IdentificationResult) -> (String, bool) {
+    let (level, word, headline) = of_logs(result);
+    (format!("{word} {headline}"), level != Level::Poor)
+}
+
+fn of_logs(result: &IdentificationResult) -> (Level, &'static str, String) {
+    match &result.validation {
+        Some(v) if !v.joints.is_empty() => of_held_out(v),
+        _ => (
+            Level::Poor,
+            "Not proved.",
+            "No motion was held out, so nothing says how the model does on another one.".into(),
+        ),
+    }
+}
+
 pub(super) fn verdict(data: &ReportData) -> PlainVerdict {
     let r = data.result;
-    let (level, word, headline) = match (data.paper, &r.validation) {
-        (Some(paper), _) => (
+    let (level, word, headline) = match data.paper {
+        Some(paper) => (
             Level::Good,
             "Reproduced.",
             format!(
                 "The numbers of {paper}, computed anew, stand beside the printed ones below; simulated experiments show what they mean."
             ),
         ),
-        (None, Some(v)) if !v.joints.is_empty() => of_held_out(v),
-        _ => (
-            Level::Poor,
-            "Not proved.",
-            "No motion was held out, so nothing says how the model does on another one.".into(),
-        ),
+        None => of_logs(r),
     };
     let mut points = Vec::new();
     if let (Some(train), Some(v)) = (&r.train, &r.validation) {

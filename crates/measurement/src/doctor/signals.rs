@@ -32,7 +32,11 @@ pub(crate) fn clock(log: &Log, out: &mut Vec<Finding>) {
         },
         file(),
         rate,
-        format!("{rate:.6} samples a second over {duration:.3} s"),
+        format!(
+            "{} samples a second over {} s",
+            rounded(rate),
+            rounded(duration)
+        ),
         if rate < SLOWEST {
             "accelerations of an arm need at least 50"
         } else {
@@ -47,8 +51,8 @@ pub(crate) fn clock(log: &Log, out: &mut Vec<Finding>) {
             file(),
             clock.jitter,
             format!(
-                "intervals differ from {:.6} s by up to {:.0} %",
-                clock.interval,
+                "intervals differ from {} s by up to {:.0} %",
+                rounded(clock.interval),
                 100.0 * clock.jitter
             ),
             "differences need a uniform grid",
@@ -80,6 +84,11 @@ pub(crate) fn clock(log: &Log, out: &mut Vec<Finding>) {
         "an interval beyond three median intervals is a gap; nothing is interpolated across",
         "the log is split there; record again if packets were dropped throughout",
     ));
+}
+
+/// Five digits, without zeros at the end.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.4e}").parse().unwrap_or(x)
 }
 
 /// Share of samples that repeat the one before, joint by joint, beyond which a channel is stale.
@@ -312,7 +321,7 @@ pub(crate) fn standstill(log: &Log, robot: &Robot, out: &mut Vec<Finding>) {
             share,
             format!("the arm stands still in {:.0} % of the log", 100.0 * share),
             "at rest the sign of friction is not known, so Coulomb terms are biased",
-            "leave out rows at low speed, or cut the log to the motion",
+            "leave out rows at low speed with --dead-band SPEED, or cut the log to the motion (FILE@A..B)",
         ));
     }
     for (j, joint) in robot.joints().iter().enumerate() {
