@@ -6,7 +6,7 @@ use idim_measurement::{Drive, Log, Measurements};
 use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// Samples in common from which two logs are one recording: noise and a moving arm repeat no sample to the last bit.
+/// Samples in common from which two logs are one recording: noise and a moving arm repeat no sample to seven digits.
 const IN_COMMON: usize = 50;
 
 /// A log's name and what tells its samples from others'.
@@ -23,7 +23,8 @@ impl<'a> Prints<'a> {
         let print = |k: usize| {
             let mut hasher = DefaultHasher::new();
             for channel in q.iter().chain(torque) {
-                channel[k].to_bits().hash(&mut hasher);
+                // A copy in another format or unit may differ in the last digits.
+                (channel[k] as f32).to_bits().hash(&mut hasher);
             }
             hasher.finish()
         };

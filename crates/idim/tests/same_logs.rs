@@ -29,7 +29,11 @@ fn csv(t0: f64, separator: char) -> String {
             (q, qd, qdd, 2.0 * qdd + 3.0 * qd)
         };
         let (a, b) = (joint(2.0), joint(3.1));
-        let cells = [t, a.0, b.0, a.1, b.1, a.2, b.2, a.3, b.3].map(|v| v.to_string());
+        let cells = [t, a.0, b.0, a.1, b.1, a.2, b.2, a.3, b.3].map(|v| match separator {
+            ',' => v.to_string(),
+            // As many digits as other programs write.
+            _ => format!("{v:.8e}"),
+        });
         let _ = writeln!(text, "{}", cells.join(&separator.to_string()));
     }
     text
