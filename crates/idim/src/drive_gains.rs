@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::identify::Identification;
 use crate::load::LoadedRobot;
 use crate::payload::{both, load_columns};
+use crate::samples::Rows;
 use idim_base_params::{ReductionOptions, TriangularFactor, reduce};
 use idim_estimation::{DriveGainSample, InformationFactor, TotalSolution, total_least_squares};
 use idim_measurement::Measurements;
@@ -57,7 +58,13 @@ pub fn drive_gains(
         .filter(|&k| k != 0)
         .collect();
     let u = unknown.len();
-    let weights = weights(arm, &a.w, &a.y, n);
+    let weights = weights(arm, &a, n);
+    // A row that is left out weighs nothing.
+    let of_sample = |rows: &Rows, t: usize| -> Vec<f64> {
+        let used = rows.used[t * n..][..n].iter();
+        let weigh = |(u, w): (&bool, &f64)| if *u { *w } else { 0.0 };
+        used.zip(&weights).map(weigh).collect()
+    };
     let mut factor = InformationFactor::new(n + p + u);
     let no_load = (vec![0.0; n * u], vec![0.0; n]);
     for (t, signal) in a.y.chunks_exact(n).enumerate() {
@@ -67,7 +74,7 @@ pub fn drive_gains(
             load: &no_load.0,
             known_torque: &no_load.1,
         };
-        sample.push(&weights, &mut factor)?;
+        sample.push(&of_sample(&a, t), &mut factor)?;
     }
     for (t, signal) in b.y.chunks_exact(n).enumerate() {
         let rows = &load.w[t * n * l..][..n * l];
@@ -82,24 +89,26 @@ pub fn drive_gains(
             load: &of_unknown,
             known_torque: &known,
         };
-        sample.push(&weights, &mut factor)?;
+        sample.push(&of_sample(&b, t), &mut factor)?;
     }
     Ok(answer(total_least_squares(&factor)?, &arm.joints, mass))
 }
 
 /// One over the standard deviation of each joint's residual without load.
-fn weights(arm: &Identification, w: &[f64], y: &[f64], n: usize) -> Vec<f64> {
+fn weights(arm: &Identification, rows: &Rows, n: usize) -> Vec<f64> {
     let p = arm.values.len();
-    let mut squares = vec![0.0; n];
-    for (row, (w, y)) in w.chunks_exact(p).zip(y).enumerate() {
+    let (mut squares, mut counts) = (vec![0.0; n], vec![0.0_f64; n]);
+    for (row, (w, y)) in rows.w.chunks_exact(p).zip(&rows.y).enumerate() {
+        if !rows.used[row] {
+            continue;
+        }
         let predicted: f64 = w.iter().zip(&arm.values).map(|(w, x)| w * x).sum();
         squares[row % n] += (y - predicted).powi(2);
+        counts[row % n] += 1.0;
     }
-    let samples = (y.len() / n) as f64;
     // A joint that is fitted exactly is weighted as if its noise were rounding.
-    squares
-        .iter()
-        .map(|s| 1.0 / (s / samples).sqrt().max(1e-9))
+    let each = squares.iter().zip(counts);
+    each.map(|(s, count)| 1.0 / (s / count.max(1.0)).sqrt().max(1e-9))
         .collect()
 }
 

@@ -218,7 +218,7 @@ fn with_own_dead_band(
     plan.with_dead_band((0..robot.n_joints()).map(own).collect(), why)
 }
 
-/// Held-out torques as the fit sees them: filtered and decimated alike, rows within the dead band left out.
+/// Held-out torques as the fit sees them: filtered and decimated alike, the same rows left out.
 fn in_band(
     predictions: &[Prediction],
     held_out: &[Stretch],
@@ -234,10 +234,12 @@ fn in_band(
         }
         let kept = decimator.kept(n_samples);
         let moving = |series: &Vec<f64>, joint: usize| -> Vec<f64> {
-            let dead = plan.dead_band.get(joint).copied().unwrap_or(0.0);
-            let fast = |sample: &usize| stretch.states.qd(joint)[*sample].abs() >= dead;
+            let usable = stretch.usable(joint, plan, decimator.trim());
             let decimated = decimator.decimate(series).into_iter().zip(&kept);
-            decimated.filter(|(_, k)| fast(k)).map(|(v, _)| v).collect()
+            decimated
+                .filter(|(_, k)| usable[**k])
+                .map(|(v, _)| v)
+                .collect()
         };
         let each = |all: &[Vec<f64>]| all.iter().enumerate().map(|(j, s)| moving(s, j)).collect();
         out.push(Prediction {

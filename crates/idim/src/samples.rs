@@ -3,6 +3,7 @@
 use crate::columns::{ModelColumns, reversal_of, smooth_sign};
 use crate::error::Error;
 use crate::plan::{PASS_BAND, Parallel, SamplingPlan};
+use idim_measurement::doctor::clipped_at;
 use idim_measurement::{Choice, ConditioningOptions, Decimator, LowPass, Measurements, condition};
 use idim_model::{
     Columns, JointStates, Model, Notation, Parameter, ParameterKind, Robot, visit_torque_regressor,
@@ -23,6 +24,8 @@ pub(crate) struct Stretch {
     pub(crate) states: JointStates,
     /// Recorded torque, joint by joint.
     pub(crate) torque: Vec<Vec<f64>>,
+    /// Whether each sample's torque was clipped, joint by joint; empty for a joint without.
+    pub(crate) clipped: Vec<Vec<bool>>,
     /// Torque of the rigid body, joint by joint, where a fit before knows it.
     pub(crate) load: Option<Vec<Vec<f64>>>,
 }
@@ -35,8 +38,26 @@ impl Stretch {
             time: Vec::new(),
             states,
             torque: Vec::new(),
+            clipped: Vec::new(),
             load: None,
         }
+    }
+
+    /// Which samples' rows of a joint are used: it moves as fast as the dead band, and no torque within `reach` samples was
+    /// clipped, as far as a filter smears it.
+    pub(crate) fn usable(&self, joint: usize, plan: &SamplingPlan, reach: usize) -> Vec<bool> {
+        let dead = plan.dead_band.get(joint).copied().unwrap_or(0.0);
+        let speeds = self.states.qd(joint).iter();
+        let mut usable: Vec<bool> = speeds.map(|v| v.abs() >= dead).collect();
+        let clipped = self.clipped.get(joint).map_or(&[][..], Vec::as_slice);
+        let mut done = 0;
+        for (k, _) in clipped.iter().enumerate().filter(|(_, c)| **c) {
+            let end = (k + reach + 1).min(usable.len());
+            let start = k.saturating_sub(reach).max(done);
+            usable[start.min(end)..end].fill(false);
+            done = end;
+        }
+        usable
     }
 }
 
@@ -56,8 +77,10 @@ fn conditioned(
     measured: &Measurements,
     plan: &SamplingPlan,
 ) -> Result<(Vec<Stretch>, Vec<Choice>), Error> {
+    let clipped = clipped(measured);
     let Some(cutoff) = plan.cutoff else {
         let whole = Stretch {
+            clipped: clipped.clone(),
             file: measured.file.clone(),
             time: measured.time.clone(),
             states: measured.states_as_recorded()?,
@@ -77,6 +100,10 @@ fn conditioned(
     };
     let conditioned = condition(measured, &options)?;
     let stretches = conditioned.segments.into_iter().map(|s| Stretch {
+        clipped: clipped
+            .iter()
+            .map(|c| at_times(&measured.time, c, &s.time))
+            .collect(),
         file: measured.file.clone(),
         time: s.time,
         states: s.states,
@@ -84,6 +111,42 @@ fn conditioned(
         load: None,
     });
     Ok((stretches.collect(), conditioned.choices))
+}
+
+/// Whether each sample's torque is one at which its joint is clipped; empty for a joint that is not.
+fn clipped(measured: &Measurements) -> Vec<Vec<bool>> {
+    let of = |torque: &Vec<f64>| match clipped_at(torque) {
+        levels if levels.is_empty() => Vec::new(),
+        levels => torque.iter().map(|t| levels.contains(t)).collect(),
+    };
+    measured.torque.iter().map(of).collect()
+}
+
+/// Marks at other times: those of the samples before and after.
+fn at_times(time: &[f64], marks: &[bool], at: &[f64]) -> Vec<bool> {
+    if marks.is_empty() {
+        return Vec::new();
+    }
+    let mark = |t: &f64| {
+        let after = time.partition_point(|s| s < t).min(marks.len() - 1);
+        marks[after] || marks[after.saturating_sub(1)]
+    };
+    at.iter().map(mark).collect()
+}
+
+/// What is clipped in a log, in a sentence a joint.
+fn said_of_clipped(measured: &Measurements) -> Vec<String> {
+    let joints = measured.joints.iter().zip(clipped(measured));
+    joints
+        .filter(|(_, clipped)| !clipped.is_empty())
+        .map(|(joint, clipped)| {
+            let count = clipped.iter().filter(|c| **c).count();
+            format!(
+                "torque of {joint} at its limit in {count} samples ({:.1} %: saturated; its rows as far as the filter spreads them are left out of the fit)",
+                100.0 * count as f64 / clipped.len() as f64
+            )
+        })
+        .collect()
 }
 
 /// The stretches of several logs.
@@ -120,6 +183,7 @@ pub(crate) fn stated_stretches(
             })
             .collect();
         own.extend(short);
+        own.extend(said_of_clipped(log));
         if !own.is_empty() {
             said.push(format!("{}: {}", log.file, own.join("; ")));
         }
@@ -166,7 +230,7 @@ pub(crate) struct Rows {
     pub(crate) w: Vec<f64>,
     /// Torques.
     pub(crate) y: Vec<f64>,
-    /// Whether a row is used: not where its joint moves slower than the dead band.
+    /// Whether a row is used: see [`Stretch::usable`].
     pub(crate) used: Vec<bool>,
     /// Log and time of each sample, s.
     pub(crate) at: Vec<(String, f64)>,
@@ -207,14 +271,14 @@ pub(crate) fn push_rows(
         })
         .collect();
     for (joint, decimated) in joints.iter().enumerate() {
-        let dead = plan.dead_band.get(joint).copied().unwrap_or(0.0);
+        let usable = stretch.usable(joint, plan, decimator.trim());
         for (k, &sample) in samples.iter().enumerate() {
             let row = start + k * n + joint;
             for c in 0..p {
                 rows.w[row * p + c] = decimated[c][k];
             }
             rows.y[row] = decimated[p][k];
-            rows.used[row] = stretch.states.qd(joint)[sample].abs() >= dead;
+            rows.used[row] = usable[sample];
             if let Some(c) = (0..p).find(|&c| !decimated[c][k].is_finite()) {
                 return Err(Error::input(
                     format!("{} at t = {} s", stretch.file, stretch.time[sample]),

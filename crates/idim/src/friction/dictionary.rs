@@ -324,11 +324,11 @@ fn fold(
     series.push(&stretch.torque[joint]);
     let decimated = decimator.decimate_columns(&series);
     let kept = decimator.kept(n_samples);
-    let dead = plan.dead_band.get(joint).copied().unwrap_or(0.0);
+    let usable = stretch.usable(joint, plan, decimator.trim());
     let p = columns.len();
     let n_blocks = blocks.len();
     for (k, &sample) in kept.iter().enumerate() {
-        if speed[sample].abs() < dead {
+        if !usable[sample] {
             continue;
         }
         let block = k * n_blocks / kept.len();

@@ -9,6 +9,7 @@ mod velocity;
 
 pub use finding::{Finding, Severity};
 pub use prediction::{TorqueFit, examine_torque, torque_fits};
+pub use signals::clipped_at;
 pub use torque::torque_lag;
 
 use crate::error::Place;

@@ -132,35 +132,43 @@ const SATURATED: f64 = 0.005;
 /// How much more often than the next level the extreme must occur: a sine on a lattice reaches 2.4.
 const PILE_UP: f64 = 5.0;
 
+/// Values at which a torque channel is clipped, lowest first: an extreme met much more often than the next value to it.
+pub fn clipped_at(x: &[f64]) -> Vec<f64> {
+    let mut sorted = x.to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let up: Vec<f64> = sorted.iter().rev().copied().collect();
+    let mut found = Vec::new();
+    for levels in [&sorted, &up] {
+        let Some(&extreme) = levels.first() else {
+            continue;
+        };
+        let count = levels.iter().take_while(|v| **v == extreme).count();
+        let next = levels[count..]
+            .iter()
+            .take_while(|v| **v == levels[count])
+            .count();
+        let share = count as f64 / x.len() as f64;
+        if next > 0 && share >= SATURATED && count as f64 > PILE_UP * next as f64 {
+            found.push(extreme);
+        }
+    }
+    found
+}
+
 pub(crate) fn saturation(log: &Log, out: &mut Vec<Finding>) {
     for (j, x) in drive(log).iter().enumerate() {
-        let mut sorted = x.clone();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let up: Vec<f64> = sorted.iter().rev().copied().collect();
-        for levels in [&sorted, &up] {
-            let count = levels.iter().take_while(|v| **v == levels[0]).count();
-            let next = levels[count..]
-                .iter()
-                .take_while(|v| **v == levels[count])
-                .count();
+        for level in clipped_at(x) {
+            let count = x.iter().filter(|v| **v == level).count();
             let share = count as f64 / x.len() as f64;
-            let piled = count as f64 > PILE_UP * next as f64;
-            if next == 0 || share < SATURATED || !piled {
-                continue;
-            }
-            let first = x.iter().position(|v| *v == levels[0]).unwrap_or(0);
+            let first = x.iter().position(|v| *v == level).unwrap_or(0);
             out.push(Finding::new(
                 "saturation",
                 Severity::Warning,
                 log.place(first).joint(&log.joints[j]),
                 share,
-                format!(
-                    "{:.1} % of the torque samples are exactly {}",
-                    100.0 * share,
-                    levels[0]
-                ),
+                format!("{:.1} % of the torque samples are exactly {level}", 100.0 * share),
                 "a value met so often at the extreme is a limit, not a torque",
-                "leave these samples out, or record a gentler motion",
+                "this joint's rows around them are left out of a fit; record a gentler motion to keep them",
             ));
         }
     }
