@@ -121,10 +121,11 @@ fn runs(args: &LoadedRuns) -> Result<Runs, Error> {
         "--log and as --loaded",
         LOADED_ALREADY,
     )?;
-    let mapping = args.reading.mapping()?;
+    let mapping = args.reading.mapping(&[&args.log, &args.loaded])?;
+    let [logs, loaded_logs] = args.reading.cut([&args.log, &args.loaded])?;
     let waivers = args.reading.waivers(&loaded.robot)?;
-    let without = read_logs_despite(&args.log, &loaded, &mapping, waivers, doubts_a_torque)?;
-    let with = read_logs_despite(&args.loaded, &loaded, &mapping, waivers, doubts_a_torque)?;
+    let without = read_logs_despite(&logs, &loaded, &mapping, waivers, doubts_a_torque)?;
+    let with = read_logs_despite(&loaded_logs, &loaded, &mapping, waivers, doubts_a_torque)?;
     refuse_shared(&with.prints(), &without.prints(), "--log", LOADED_ALREADY)?;
     let links = loaded.robot.links();
     let link = match &args.on {

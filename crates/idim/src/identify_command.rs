@@ -160,10 +160,11 @@ fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<()
         },
         seed: args.seed,
     };
-    let mapping = args.reading.mapping()?;
+    let mapping = args.reading.mapping(&[&args.log, &args.validate])?;
+    let [logs, validate] = args.reading.cut([&args.log, &args.validate])?;
     let waivers = args.reading.waivers(&loaded.robot)?;
-    let training = read_logs(&args.log, &loaded, &mapping, waivers)?;
-    let validation = read_logs(&args.validate, &loaded, &mapping, waivers)?;
+    let training = read_logs(&logs, &loaded, &mapping, waivers)?;
+    let validation = read_logs(&validate, &loaded, &mapping, waivers)?;
     let seen = training.prints();
     refuse_shared(&validation.prints(), &seen, "--log", PROVED_ON_ITSELF)?;
     progress.stage("identifying");

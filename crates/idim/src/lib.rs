@@ -60,7 +60,7 @@ pub use identify_command::IdentifyArgs;
 pub use least_squares::{information_factor, running_qr};
 pub use load::{Changes, LoadedRobot, load_robot};
 pub use log_options::{FittingArgs, ReadingArgs, RobustChoice, SamplingArgs, WeightingChoice};
-pub use log_spec::LogSpec;
+pub use log_spec::{Exclusion, LogSpec, Span};
 pub use output::write_atomically;
 pub use payload::{Payload, identify_payload};
 pub use plan::SamplingOptions;

@@ -6,11 +6,12 @@ use crate::check::Waiver;
 use crate::cli::{Column, drive_columns};
 use crate::error::Error;
 use crate::friction::{FrictionChoice, parse_friction};
+use crate::log_spec::{Exclusion, LogSpec};
 use crate::logs::read_mapping;
 use crate::plan::SamplingOptions;
 use clap::{Args, ValueEnum};
 use idim_estimation::{HUBER_K, RobustLoss, TUKEY_C, Weighting};
-use idim_measurement::ColumnMapping;
+use idim_measurement::{ColumnMapping, TorqueDelay};
 use idim_model::{DriveColumns, Robot};
 use std::path::PathBuf;
 
@@ -23,6 +24,18 @@ pub struct ReadingArgs {
     /// Accept a finding of the log doctor by name, of all joints or of one; may be repeated.
     #[arg(long, value_name = "CODE[:JOINT]")]
     pub waive: Vec<Waiver>,
+    /// Leave out a part of a log: samples A to B (without B, from 0), or 12.5s..14s on its clock; may be repeated.
+    #[arg(long, value_name = "[LOG:]A..B", value_parser = Exclusion::parse)]
+    pub exclude: Vec<Exclusion>,
+    /// Leave out rows with a cell that is no finite number, and split the log there.
+    #[arg(long)]
+    pub drop_bad: bool,
+    /// How late the torques were recorded behind the positions, ms, of all joints or of one; may be repeated.
+    #[arg(long, value_name = "[JOINT=]MS", value_parser = parse_delay, allow_hyphen_values = true)]
+    pub delay: Vec<TorqueDelay>,
+    /// Topic of a bag that has several of JointState.
+    #[arg(long, value_name = "NAME")]
+    pub topic: Option<String>,
 }
 
 impl ReadingArgs {
@@ -31,15 +44,91 @@ impl ReadingArgs {
         named(&[
             ("--mapping", self.mapping.is_some()),
             ("--waive", !self.waive.is_empty()),
+            ("--exclude", !self.exclude.is_empty()),
+            ("--drop-bad", self.drop_bad),
+            ("--delay", !self.delay.is_empty()),
+            ("--topic", self.topic.is_some()),
         ])
     }
 
-    /// The mapping of the columns.
+    /// The mapping of the columns, with what the options say of it; `logs` are all that it is for.
     ///
     /// # Errors
-    /// A file that cannot be read or is no mapping.
-    pub(crate) fn mapping(&self) -> Result<ColumnMapping, Error> {
-        read_mapping(self.mapping.as_ref())
+    /// A file that cannot be read or is no mapping; what stands in it and in an option; a topic where there is no bag.
+    pub(crate) fn mapping(&self, logs: &[&[LogSpec]]) -> Result<ColumnMapping, Error> {
+        let mut mapping = read_mapping(self.mapping.as_ref())?;
+        for (option, both) in [
+            ("topic", mapping.topic.is_some() && self.topic.is_some()),
+            (
+                "delay",
+                !mapping.delays.is_empty() && !self.delay.is_empty(),
+            ),
+        ] {
+            if both {
+                return Err(Error::input(
+                    format!("--{option} and --mapping"),
+                    format!("the mapping file states the {option} too"),
+                    "state it in one of them",
+                ));
+            }
+        }
+        mapping.topic = mapping.topic.or_else(|| self.topic.clone());
+        mapping.delays.extend(self.delay.iter().cloned());
+        mapping.drop_bad |= self.drop_bad;
+        if let Some(topic) = &mapping.topic
+            && !logs.iter().copied().flatten().any(LogSpec::is_bag)
+        {
+            return Err(Error::input(
+                format!("topic {topic}"),
+                "none of the logs is a bag",
+                "topics are of .db3 and .mcap files; leave it out",
+            ));
+        }
+        for (k, delay) in mapping.delays.iter().enumerate() {
+            if mapping.delays[..k].iter().any(|d| d.joint == delay.joint) {
+                let whose = delay.joint.as_deref().unwrap_or("all joints");
+                let rule = "one for all joints, and one for each that differs";
+                return Err(Error::input(
+                    "--delay",
+                    format!("two delays of {whose}"),
+                    rule,
+                ));
+            }
+        }
+        Ok(mapping)
+    }
+
+    /// The logs with the parts that are left out of each.
+    ///
+    /// # Errors
+    /// A part of no log, or of one that is not named where there are several.
+    pub(crate) fn cut<const N: usize>(
+        &self,
+        logs: [&[LogSpec]; N],
+    ) -> Result<[Vec<LogSpec>; N], Error> {
+        let mut cut = logs.map(<[LogSpec]>::to_vec);
+        for exclusion in &self.exclude {
+            let mut files: Vec<Vec<PathBuf>> = Vec::new();
+            for spec in cut.iter_mut().flatten().filter(|s| exclusion.names(s)) {
+                spec.left_out.push(exclusion.span.clone());
+                if !files.contains(&spec.files) {
+                    files.push(spec.files.clone());
+                }
+            }
+            if files.len() != 1 {
+                let named = exclusion.log.as_deref().unwrap_or("a log without a name");
+                let names: Vec<String> = logs.concat().iter().map(LogSpec::name).collect();
+                return Err(Error::input(
+                    format!("--exclude {named}"),
+                    format!("{} logs are meant", files.len()),
+                    format!(
+                        "name one as --log does, LOG:A..B; there are {}",
+                        names.join(", ")
+                    ),
+                ));
+            }
+        }
+        Ok(cut)
     }
 
     /// What is accepted of the log doctor's findings.
@@ -227,6 +316,21 @@ impl FittingArgs {
 /// The names of those that are true.
 pub(crate) fn named(all: &[(&'static str, bool)]) -> Vec<&'static str> {
     all.iter().filter(|o| o.1).map(|o| o.0).collect()
+}
+
+fn parse_delay(text: &str) -> Result<TorqueDelay, String> {
+    let (joint, ms) = match text.rsplit_once('=') {
+        Some((joint, ms)) => (Some(joint.to_owned()), ms),
+        None => (None, text),
+    };
+    let number: f64 = ms.trim().parse().unwrap_or(f64::NAN);
+    if !number.is_finite() {
+        return Err(format!("`{ms}` is not a number of milliseconds"));
+    }
+    Ok(TorqueDelay {
+        joint,
+        seconds: 1e-3 * number,
+    })
 }
 
 fn parse_positive(text: &str) -> Result<f64, String> {

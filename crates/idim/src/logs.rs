@@ -3,7 +3,7 @@
 use crate::check::{CheckedFinding, Waiver, diagnose, gate, marked};
 use crate::error::Error;
 use crate::load::{LoadedRobot, read_text};
-use crate::log_spec::LogSpec;
+use crate::log_spec::{LogSpec, Span};
 use crate::same_samples::{Prints, refuse_repeated};
 use crate::transmission::joint_side;
 use idim_measurement::doctor::Finding;
@@ -11,6 +11,7 @@ use idim_measurement::formats::read_log;
 use idim_measurement::{
     ColumnMapping, JointLabel, Log, Measurements, infer_time_unit, joint_labels, read_csv_files,
 };
+use idim_model::Robot;
 use std::path::{Path, PathBuf};
 
 /// Logs read and what was noted about them.
@@ -101,10 +102,97 @@ pub(crate) fn read_log_spec(
         ));
     }
     infer_time_unit(&mut log);
-    Ok(match &spec.samples {
-        None => log,
-        Some(range) => log.slice(within(range, log.n_samples(), &name)?),
-    })
+    let log = cut(log, spec, &name)?;
+    match delays(mapping, &loaded.robot)? {
+        Some(delays) => Ok(log.with_torque_delays(&delays)?),
+        None => Ok(log),
+    }
+}
+
+/// The samples wanted, without the parts that are left out.
+fn cut(mut log: Log, spec: &LogSpec, name: &str) -> Result<Log, Error> {
+    let n = log.n_samples();
+    let range = match &spec.samples {
+        Some(range) => within(range, n, name)?,
+        None => 0..n,
+    };
+    if spec.left_out.is_empty() {
+        return Ok(log.slice(range));
+    }
+    let mut keep = vec![true; n];
+    for span in &spec.left_out {
+        let (text, inside): (String, Vec<usize>) = match span {
+            Span::Samples(s) => (
+                format!("samples {} to {}", s.start, s.end.min(n).saturating_sub(1)),
+                (s.start.min(n)..s.end.min(n)).collect(),
+            ),
+            Span::Time([from, to]) => (
+                format!("{from} to {to} s"),
+                (0..n)
+                    .filter(|&k| (*from..=*to).contains(&log.time[k]))
+                    .collect(),
+            ),
+        };
+        if inside.is_empty() {
+            return Err(Error::input(
+                format!("--exclude of {name}"),
+                format!("{text} hold no sample"),
+                format!(
+                    "the log has samples 0 to {}, from {} to {} s on its clock",
+                    n - 1,
+                    log.time[0],
+                    log.time[n - 1]
+                ),
+            ));
+        }
+        for &k in &inside {
+            keep[k] = false;
+        }
+        let met = inside.iter().filter(|k| range.contains(k)).count();
+        log.notes.push(format!(
+            "left out as stated, {text}: {met} samples, and as many beside them as make a gap"
+        ));
+    }
+    let log = log.slice(range.clone()).keeping(&keep[range]);
+    if log.n_samples() < FEWEST_SAMPLES {
+        return Err(Error::input(
+            name,
+            format!("{} samples left without the excluded ones", log.n_samples()),
+            format!("identification needs at least {FEWEST_SAMPLES}; exclude less"),
+        ));
+    }
+    Ok(log)
+}
+
+/// How late each joint's torque was recorded, s; `None` where nothing is said of it.
+fn delays(mapping: &ColumnMapping, robot: &Robot) -> Result<Option<Vec<f64>>, Error> {
+    if mapping.delays.is_empty() {
+        return Ok(None);
+    }
+    let stranger = |joint: &&String| robot.joint_index(joint).is_none();
+    let mut named = mapping.delays.iter().filter_map(|d| d.joint.as_ref());
+    if let Some(joint) = named.find(stranger) {
+        let names: Vec<&str> = robot.joints().iter().map(|j| j.name.as_str()).collect();
+        let rule = format!("the joints are {}", names.join(", "));
+        return Err(Error::input(
+            format!("delay of {joint}"),
+            "no such joint",
+            rule,
+        ));
+    }
+    let of = |name: Option<&str>| {
+        let delays = mapping.delays.iter();
+        delays
+            .filter(|d| d.joint.as_deref() == name)
+            .map(|d| d.seconds)
+            .next()
+    };
+    let joints = robot.joints().iter();
+    Ok(Some(
+        joints
+            .map(|j| of(Some(&j.name)).or_else(|| of(None)).unwrap_or(0.0))
+            .collect(),
+    ))
 }
 
 fn read(spec: &LogSpec, labels: &[JointLabel], mapping: &ColumnMapping) -> Result<Log, Error> {

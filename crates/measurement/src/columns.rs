@@ -3,9 +3,11 @@
 use crate::error::{Error, Place};
 use crate::header::JointLabel;
 use crate::layout::find_layout;
+use crate::left_out::BadRows;
 use crate::log::{Log, Parts, assemble, objection};
 use crate::mapping::ColumnMapping;
 use crate::quantity::Quantity;
+use std::collections::BTreeMap;
 
 /// A named column of a recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,6 +34,7 @@ pub fn log_from_columns(
     let headers: Vec<String> = columns.iter().map(|c| c.name.clone()).collect();
     let layout = find_layout(&headers, joints, mapping, file)?;
     let mut needed: Vec<Vec<f64>> = Vec::new();
+    let mut bad: BTreeMap<usize, Error> = BTreeMap::new();
     for (quantity, source) in layout.sources() {
         let column = &columns[source.column];
         let place = || Place::file(file).column(&column.name);
@@ -61,17 +64,18 @@ pub fn log_from_columns(
         for (row, &number) in values.iter().enumerate() {
             let value = number * source.factor;
             if let Some((code, rule)) = objection(quantity, number, value) {
-                return Err(Error::log(
-                    code,
-                    place(),
-                    format!("{number:e} in row {}", row + 1),
-                    rule,
-                ));
+                let met = format!("{number:e} in row {}", row + 1);
+                let error = Error::log(code, place(), met, rule);
+                if !mapping.drop_bad {
+                    return Err(error);
+                }
+                bad.entry(row).or_insert(error);
             }
             scaled.push(value);
         }
         needed.push(scaled);
     }
+    let bad = without_bad(&mut needed, bad)?;
     let repeated = if layout.time.is_some() {
         let name = layout.time.map_or("", |s| headers[s.column].as_str());
         drop_repeated(file, name, &mut needed)?
@@ -84,8 +88,26 @@ pub fn log_from_columns(
         lines: Vec::new(),
         format,
         repeated,
+        bad,
     };
     assemble(file, joints, mapping, parts)
+}
+
+/// Leaves out rows that break a rule of their own.
+fn without_bad(columns: &mut [Vec<f64>], found: BTreeMap<usize, Error>) -> Result<BadRows, Error> {
+    let mut bad = BadRows::default();
+    let rows: Vec<usize> = found.keys().copied().collect();
+    for (passed, (row, error)) in found.into_iter().enumerate() {
+        bad.note(row - passed, error)?;
+    }
+    for column in columns.iter_mut().filter(|_| !rows.is_empty()) {
+        let mut row = 0;
+        column.retain(|_| {
+            row += 1;
+            rows.binary_search(&(row - 1)).is_err()
+        });
+    }
+    Ok(bad)
 }
 
 /// Leaves out rows that repeat the one before; refuses time that does not rise. The first column is time.

@@ -4,6 +4,7 @@ use crate::dialect::{Dialect, decode, without_hint};
 use crate::error::{Error, Place, printable};
 use crate::header::JointLabel;
 use crate::layout::{Layout, Source, find_layout};
+use crate::left_out::BadRows;
 use crate::log::{Log, Parts, assemble, objection};
 use crate::mapping::ColumnMapping;
 use crate::quantity::Quantity;
@@ -31,14 +32,20 @@ pub fn read_csv(
     let (headers, dialect) = (sheet.headers.clone(), sheet.dialect);
     let layout = find_layout(&headers, joints, mapping, file)?;
     let mut table = Table::new(&headers, &layout, dialect, file);
+    let mut bad = BadRows::default();
     while let Some(line) = sheet.next_line()? {
-        table.push(&line)?;
+        match table.row(&line) {
+            Ok(row) => table.push(row, line.number)?,
+            Err(error) if mapping.drop_bad => bad.note(table.lines.len(), error)?,
+            Err(error) => return Err(error),
+        }
     }
     let parts = Parts {
         columns: table.columns,
         lines: table.lines,
         format: format!("CSV: {dialect}"),
         repeated: table.repeated,
+        bad,
         layout,
     };
     assemble(file, joints, mapping, parts)
@@ -69,17 +76,18 @@ impl<'a> Table<'a> {
         }
     }
 
-    fn push(&mut self, line: &Line<'_>) -> Result<(), Error> {
+    /// The needed cells of a line, in SI units.
+    fn row(&self, line: &Line<'_>) -> Result<Vec<f64>, Error> {
         line.check_count(self.headers.len(), self.file)?;
-        let Line {
-            number: line,
-            cells,
-        } = line;
-        let line = *line;
-        let mut row = Vec::with_capacity(self.sources.len());
-        for &(quantity, source) in &self.sources {
-            row.push(self.value(quantity, source, cells[source.column], line)?);
-        }
+        let sources = self.sources.iter();
+        sources
+            .map(|&(quantity, source)| {
+                self.value(quantity, source, line.cells[source.column], line.number)
+            })
+            .collect()
+    }
+
+    fn push(&mut self, row: Vec<f64>, line: u64) -> Result<(), Error> {
         if self.sources[0].0 == Quantity::Time
             && let Some(&before) = self.columns[0].last()
             && row[0] <= before

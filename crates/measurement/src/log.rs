@@ -3,6 +3,7 @@
 use crate::error::{Error, Place};
 use crate::header::JointLabel;
 use crate::layout::Layout;
+use crate::left_out::BadRows;
 use crate::mapping::ColumnMapping;
 use crate::quantity::Quantity;
 
@@ -107,7 +108,7 @@ pub(crate) fn objection(
     if !number.is_finite() {
         return Some((
             "not-finite",
-            "every sample needs a finite number; cut the log where it is whole, a value is never made up",
+            "every sample needs a finite number, and a value is never made up; leave such rows out with --drop-bad, or cut the log where it is whole",
         ));
     }
     let absurd = quantity != Quantity::Time && value.abs() > LARGEST;
@@ -124,6 +125,7 @@ pub(crate) struct Parts {
     pub(crate) lines: Vec<u64>,
     pub(crate) format: String,
     pub(crate) repeated: usize,
+    pub(crate) bad: BadRows,
 }
 
 pub(crate) fn assemble(
@@ -144,13 +146,19 @@ pub(crate) fn assemble(
     let layout = parts.layout;
     let mut notes = vec![parts.format];
     notes.extend(layout.notes);
+    notes.extend(parts.bad.stated(n_samples)?);
     if parts.repeated > 0 {
         notes.push(format!("{} repeated samples left out", parts.repeated));
     }
     let mut columns = parts.columns.into_iter();
     let time = match layout.time {
         Some(_) => columns.next().unwrap_or_default(),
-        None => clock_of_rate(n_samples, mapping.sample_rate, &mut notes)?,
+        None => clock_of_rate(
+            n_samples,
+            &parts.bad.before,
+            mapping.sample_rate,
+            &mut notes,
+        )?,
     };
     let n = layout.position.len();
     let mut take = || columns.by_ref().take(n).collect::<Vec<_>>();
@@ -162,7 +170,7 @@ pub(crate) fn assemble(
         _ => Drive::Torque(take()),
     };
     let free = joints.iter().filter(|j| !j.held);
-    Ok(Log {
+    let log = Log {
         file: file.to_string(),
         joints: free.map(|j| j.name.clone()).collect(),
         time_unit_declared: layout.time.is_none_or(|s| s.declared),
@@ -173,11 +181,13 @@ pub(crate) fn assemble(
         drive,
         notes,
         lines: parts.lines,
-    })
+    };
+    Ok(log.with_gaps_before(&parts.bad.before))
 }
 
 fn clock_of_rate(
     n_samples: usize,
+    bad_before: &[usize],
     sample_rate: Option<f64>,
     notes: &mut Vec<String>,
 ) -> Result<Vec<f64>, Error> {
@@ -189,5 +199,15 @@ fn clock_of_rate(
     notes.push(format!(
         "no time column: {rate} samples a second, as stated"
     ));
-    Ok((0..n_samples).map(|k| k as f64 / rate).collect())
+    // The clock runs on through rows that are left out.
+    let mut bad = bad_before.iter().peekable();
+    let mut passed = 0;
+    Ok((0..n_samples)
+        .map(|k| {
+            while bad.next_if(|b| **b <= k).is_some() {
+                passed += 1;
+            }
+            (k + passed) as f64 / rate
+        })
+        .collect())
 }

@@ -14,6 +14,23 @@ pub struct ColumnMapping {
     pub columns: Vec<MappedColumn>,
     /// Samples a second, Hz, for a log without a time column.
     pub sample_rate: Option<f64>,
+    /// Topic of a bag that has several of JointState.
+    pub topic: Option<String>,
+    /// Leave out rows with a cell that is no finite number, and split the log there; refused otherwise.
+    pub drop_bad: bool,
+    /// How late the torques were recorded; not applied by readers, but by [`Log::with_torque_delays`](crate::Log::with_torque_delays).
+    pub delays: Vec<TorqueDelay>,
+}
+
+/// How much later than the positions a torque was recorded.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TorqueDelay {
+    /// Name of the joint; of all that have none of their own where left out.
+    #[serde(default)]
+    pub joint: Option<String>,
+    /// Delay, s; a few milliseconds typical.
+    pub seconds: f64,
 }
 
 /// One column of a [`ColumnMapping`], or with `{}` in the header one of every joint.

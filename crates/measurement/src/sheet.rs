@@ -110,7 +110,7 @@ pub(crate) fn number(
         return Err((
             "not-finite",
             "an empty cell".into(),
-            "every sample needs a value; cut the log where it is whole, a value is never made up",
+            "every sample needs a value, and none is made up; leave such rows out with --drop-bad, or cut the log where it is whole",
         ));
     }
     let parsed = if dialect.decimal == ',' && cell.contains(',') {

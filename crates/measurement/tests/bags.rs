@@ -194,7 +194,23 @@ mod rosbag2 {
             &["a.db3", "no topic of sensor_msgs"],
         );
         let both = read("b.db3", &[("/left", KIND), ("/right", KIND)]);
-        assert_says(both, "missing-column", &["2 topics", "/left, /right"]);
+        assert_says(
+            both,
+            "missing-column",
+            &["2 topics", "/left, /right", "--topic"],
+        );
+        let path = folder.path().join("b.db3");
+        let of = |topic: &str| {
+            let mapping = ColumnMapping {
+                topic: Some(topic.into()),
+                ..ColumnMapping::default()
+            };
+            read_log(&path, &labels(&two()), &mapping)
+        };
+        let right = of("/right").unwrap();
+        assert!(right.notes.join("\n").contains("topic /right"));
+        assert_eq!(right.n_samples(), 20);
+        assert_says(of("/up"), "missing-column", &["/up", "/left, /right"]);
         let path = folder.path().join("c.db3");
         std::fs::write(&path, b"SQLite format 3\0 but no more").unwrap();
         let cut = read_log(&path, &labels(&two()), &ColumnMapping::default());

@@ -30,6 +30,7 @@ fn columns_of_several_files_stand_side_by_side() {
             column("tau.csv:Joint_2", Quantity::Torque, 2),
         ],
         sample_rate: Some(100.0),
+        ..ColumnMapping::default()
     };
     let read = |q: &str, tau: &str| {
         let files = [(q.as_bytes(), "q.csv"), (tau.as_bytes(), "tau.csv")];
@@ -76,6 +77,7 @@ fn oracle_the_recorded_tx40_reads_from_its_two_files() {
     let mapping = ColumnMapping {
         columns,
         sample_rate: Some(5000.0),
+        ..ColumnMapping::default()
     };
     let files = [
         (bytes[0].as_slice(), names[0]),

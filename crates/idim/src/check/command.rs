@@ -38,11 +38,12 @@ pub struct CheckArgs {
 /// Examines logs; an error where a finding would spoil a result.
 pub(crate) fn run_check(args: &CheckArgs, out: &mut dyn Write) -> Result<(), Error> {
     let loaded = load(&args.robot, &args.changes)?;
-    let mapping = args.reading.mapping()?;
+    let mapping = args.reading.mapping(&[&args.log])?;
+    let [logs] = args.reading.cut([&args.log])?;
     let waivers = args.reading.waivers(&loaded.robot)?;
     let progress = Progress::new();
     let mut read = Vec::new();
-    for spec in &args.log {
+    for spec in &logs {
         progress.stage(format!("reading {}", spec.name()));
         read.push((spec.name(), read_log_spec(spec, &loaded, &mapping)));
     }

@@ -95,7 +95,10 @@ pub(crate) fn delay(e: &Examination, file: &str) -> Option<Finding> {
         value: Some(lag),
         met: format!("torques lag positions by {:.1} ms", 1e3 * lag),
         rule: "channels must be of one instant".into(),
-        next_step: "shift the torque columns by this time, or log both at one clock".into(),
+        next_step: format!(
+            "take it out with --delay {:.1} (ms), or log both at one clock",
+            1e3 * lag
+        ),
     })
 }
 

@@ -199,7 +199,10 @@ pub(crate) fn delay(log: &Log, samples: &Samples, out: &mut Vec<Finding>) {
             lag,
             format!("torques lag positions by {:.1} ms", 1e3 * lag),
             "channels must be of one instant",
-            "shift the torque columns by this time, or log both at one clock",
+            format!(
+                "take it out with --delay {:.1} (ms), or log both at one clock",
+                1e3 * lag
+            ),
         ));
     }
 }

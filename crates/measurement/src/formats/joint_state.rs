@@ -225,25 +225,38 @@ impl Collector {
     }
 }
 
-/// The one topic of JointState messages, or an error that lists what is there.
+/// The topic of JointState messages that is wanted, or the only one; an error lists what is there.
 pub(crate) fn one_topic<T: Clone>(
     topics: &[(String, T)],
+    wanted: Option<&str>,
     file: &str,
 ) -> Result<(String, T), Error> {
-    if let [one] = topics {
-        return Ok(one.clone());
+    let found = match (wanted, topics) {
+        (Some(name), _) => topics.iter().find(|t| t.0 == name),
+        (None, [one]) => Some(one),
+        _ => None,
+    };
+    if let Some(found) = found {
+        return Ok(found.clone());
     }
     let names: Vec<&str> = topics.iter().map(|t| t.0.as_str()).collect();
-    Err(Error::log(
-        "missing-column",
-        Place::file(file),
-        crate::header::list(
-            &format!("{} topics of sensor_msgs/msg/JointState:", names.len()),
-            &names,
-            "no topic of sensor_msgs/msg/JointState",
+    let there = crate::header::list(
+        &format!("{} topics of sensor_msgs/msg/JointState:", names.len()),
+        &names,
+        "no topic of sensor_msgs/msg/JointState",
+    );
+    let (met, rule) = match wanted {
+        Some(name) => (
+            format!("no such topic as {}; {there}", printable(name)),
+            "give the one of the arm, as it is written in the bag",
         ),
-        "a bag has one such topic; record or filter the one of the arm (`ros2 bag convert`)",
-    ))
+        None if names.is_empty() => (there, "record the joint states of the arm"),
+        None => (
+            there,
+            "say which is the arm's with --topic NAME, or as `topic` in the mapping",
+        ),
+    };
+    Err(Error::log("missing-column", Place::file(file), met, rule))
 }
 
 pub(crate) fn damaged(file: &str, what: impl std::fmt::Display) -> Error {

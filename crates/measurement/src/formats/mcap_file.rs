@@ -10,13 +10,14 @@ use mcap::MessageStream;
 /// Reads the JointState messages of an MCAP file, in the order they were received.
 ///
 /// # Errors
-/// A damaged file, no topic of JointState or several, and those of [`read_csv`](crate::read_csv).
+/// A damaged file, no topic of JointState or several and none named, and those of [`read_csv`](crate::read_csv).
 pub fn read_mcap(
     bytes: &[u8],
     file: &str,
     joints: &[JointLabel],
     mapping: &ColumnMapping,
 ) -> Result<Log, Error> {
+    let wanted = mapping.topic.as_deref();
     let mut topics: Vec<(String, ())> = Vec::new();
     let mut messages: Vec<(i64, Vec<u8>)> = Vec::new();
     for message in MessageStream::new(bytes).map_err(|e| damaged(file, e))? {
@@ -29,9 +30,12 @@ pub fn read_mcap(
         if topics.iter().all(|(topic, ())| *topic != channel.topic) {
             topics.push((channel.topic.clone(), ()));
         }
+        if wanted.is_some_and(|w| *w != channel.topic) {
+            continue;
+        }
         messages.push((message.log_time.cast_signed(), message.data.into_owned()));
     }
-    let (topic, ()) = one_topic(&topics, file)?;
+    let (topic, ()) = one_topic(&topics, wanted, file)?;
     // Chunks of several writers may overlap.
     messages.sort_by_key(|(received, _)| *received);
     let mut collector = Collector::default();

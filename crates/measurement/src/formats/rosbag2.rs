@@ -12,7 +12,7 @@ use std::path::Path;
 /// Reads the JointState messages of a ROS 2 bag (`.db3`), in the order they were received. The file is not touched.
 ///
 /// # Errors
-/// A damaged file, no topic of JointState or several, and those of [`read_csv`](crate::read_csv).
+/// A damaged file, no topic of JointState or several and none named, and those of [`read_csv`](crate::read_csv).
 pub fn read_rosbag2(
     path: &Path,
     joints: &[JointLabel],
@@ -28,11 +28,17 @@ pub fn read_rosbag2(
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let bag = Connection::open_with_flags(path, flags).map_err(|e| damaged(file, e))?;
     let mut collector = Collector::default();
-    let topic = read_messages(&bag, file, &mut collector)?;
+    let wanted = mapping.topic.as_deref();
+    let topic = read_messages(&bag, wanted, file, &mut collector)?;
     collector.finish(file, &topic, joints, mapping)
 }
 
-fn read_messages(bag: &Connection, file: &str, collector: &mut Collector) -> Result<String, Error> {
+fn read_messages(
+    bag: &Connection,
+    wanted: Option<&str>,
+    file: &str,
+    collector: &mut Collector,
+) -> Result<String, Error> {
     let sql = |e: rusqlite::Error| damaged(file, e);
     let mut topics = bag
         .prepare("SELECT name, id FROM topics WHERE type = 'sensor_msgs/msg/JointState' AND serialization_format = 'cdr' ORDER BY id")
@@ -43,7 +49,7 @@ fn read_messages(bag: &Connection, file: &str, collector: &mut Collector) -> Res
         })
         .and_then(Iterator::collect::<Result<Vec<_>, _>>)
         .map_err(sql)?;
-    let (topic, id) = one_topic(&found, file)?;
+    let (topic, id) = one_topic(&found, wanted, file)?;
     let mut messages = bag
         .prepare("SELECT timestamp, data FROM messages WHERE topic_id = ?1 ORDER BY timestamp, id")
         .map_err(sql)?;
