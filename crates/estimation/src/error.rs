@@ -1,4 +1,4 @@
-//! What can be wrong with the data handed to this crate.
+//! What can be wrong with the data handed to this crate. Fields count from 0; messages, which people read, from 1.
 
 use thiserror::Error;
 
@@ -10,7 +10,7 @@ use thiserror::Error;
 pub enum Error {
     /// A row of `[W | y]` holds a NaN or an infinity.
     #[error(
-        "row {row} (counted from 0 over all rows pushed), {place}: {value} is not finite; drop the sample or mend the log"
+        "row {} of all that were pushed, {place}: {value} is not finite; drop the sample or mend the log", .row + 1
     )]
     NonFinite {
         /// Row counted from 0 over all rows pushed so far.
@@ -42,7 +42,7 @@ pub enum Error {
     },
     /// A covariance matrix is not symmetric.
     #[error(
-        "covariance entry ({row}, {column}) is {value} but its mirror is {mirror}; give a symmetric matrix"
+        "covariance entry ({}, {}) is {value} but its mirror is {mirror}; give a symmetric matrix", .row + 1, .column + 1
     )]
     NotSymmetric {
         /// Row of the entry.
@@ -56,8 +56,8 @@ pub enum Error {
     },
     /// A covariance matrix is not positive definite.
     #[error(
-        "the noise covariance is not positive definite: given the joints before it, joint {joint} (counted from 0) has variance {variance}; \
-         a joint without noise cannot be weighted: drop its rows or state its noise"
+        "the noise covariance is not positive definite: given the joints before it, joint {} has variance {variance}; \
+         a joint without noise cannot be weighted: drop its rows or state its noise", .joint + 1
     )]
     NotPositiveDefinite {
         /// Joint counted from 0.
@@ -77,8 +77,8 @@ pub enum Error {
     },
     /// The prior of a link is no body.
     #[error(
-        "the prior of link {link} (counted from 0 in the list of links) cannot be a rigid body: its pseudo-inertia has eigenvalue {eigenvalue}; \
-         check mass, centre and triangle inequality, or take the prior from the link's geometry"
+        "the prior of link {} in the list of links cannot be a rigid body: its pseudo-inertia has eigenvalue {eigenvalue}; \
+         check mass, centre and triangle inequality, or take the prior from the link's geometry", .link + 1
     )]
     UnphysicalPrior {
         /// Link counted from 0 in the list given.
@@ -88,7 +88,7 @@ pub enum Error {
     },
     /// A free standard parameter that no row determines.
     #[error(
-        "standard parameter {column} (counted from 0) is free, and no row determines it; give it a prior or leave it out"
+        "standard parameter {} is free, and no row determines it; give it a prior or leave it out", .column + 1
     )]
     UndeterminedStandard {
         /// Its column.
@@ -116,7 +116,7 @@ pub enum Place {
 impl std::fmt::Display for Place {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Column(column) => write!(f, "column {column} of W"),
+            Self::Column(column) => write!(f, "column {} of W", column + 1),
             Self::Observation => f.write_str("the observation"),
         }
     }

@@ -177,7 +177,7 @@ fn non_finite_entries_are_refused_with_their_place() {
             value: f64::NAN
         }
         .to_string(),
-        "row 2 (counted from 0 over all rows pushed), column 1 of W: NaN is not finite; drop the sample or mend the log"
+        "row 3 of all that were pushed, column 2 of W: NaN is not finite; drop the sample or mend the log"
     );
 }
 
