@@ -265,6 +265,10 @@ mod mcap_files {
     use std::collections::BTreeMap;
 
     fn file(message: fn(i64) -> JointState) -> Vec<u8> {
+        file_of(message, false)
+    }
+
+    fn file_of(message: fn(i64) -> JointState, two_topics: bool) -> Vec<u8> {
         let mut bytes = std::io::Cursor::new(Vec::new());
         let mut writer = mcap::Writer::new(&mut bytes).unwrap();
         let schema = writer
@@ -276,11 +280,24 @@ mod mcap_files {
         let other = writer
             .add_channel(0, "/log", "json", &BTreeMap::new())
             .unwrap();
+        let second = two_topics.then(|| {
+            let no_more = BTreeMap::new();
+            writer
+                .add_channel(schema, "/gripper", "cdr", &no_more)
+                .unwrap()
+        });
         for k in 0..20 {
-            for (channel_id, data) in [
-                (other, b"{}".to_vec()),
-                (channel, encode(&message(k), true)),
-            ] {
+            let of_gripper = JointState {
+                name: vec!["finger".into()],
+                position: vec![0.0],
+                ..message(k)
+            };
+            let both = [
+                Some((other, b"{}".to_vec())),
+                second.map(|id| (id, encode(&of_gripper, true))),
+                Some((channel, encode(&message(k), true))),
+            ];
+            for (channel_id, data) in both.into_iter().flatten() {
                 let header = mcap::records::MessageHeader {
                     channel_id,
                     sequence: k as u32,
@@ -309,6 +326,26 @@ mod mcap_files {
             &["run.mcap", "damaged or cut off"],
         );
         assert_says(read(b"not mcap"), "damaged", &["run.mcap"]);
+    }
+
+    #[test]
+    fn identity_one_of_two_topics_is_read_by_its_name() {
+        let bytes = file_of(shuffled, true);
+        let read = |topic: Option<&str>| {
+            let mapping = ColumnMapping {
+                topic: topic.map(str::to_owned),
+                ..ColumnMapping::default()
+            };
+            idim_measurement::formats::read_mcap(&bytes, "run.mcap", &labels(&two()), &mapping)
+        };
+        assert_good(&read(Some("/joint_states")).unwrap());
+        let words = ["2 topics", "/gripper, /joint_states", "--topic"];
+        assert_says(read(None), "missing-column", &words);
+        assert_says(
+            read(Some("/joints")),
+            "missing-column",
+            &["/joints", words[0]],
+        );
     }
 
     #[test]
