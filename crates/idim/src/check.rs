@@ -79,7 +79,7 @@ impl CheckedFinding {
 }
 
 /// Codes of what can be found in a log that can be read.
-pub const CODES: [&str; 33] = [
+pub const CODES: [&str; 35] = [
     "sample-rate",
     "time-unit",
     "jitter",
@@ -111,6 +111,8 @@ pub const CODES: [&str; 33] = [
     "gravity-compensated",
     "torque-range",
     "torque-delay",
+    "torque-drift",
+    "few-samples",
     "wrong-robot",
     "unexplained-torque",
 ];

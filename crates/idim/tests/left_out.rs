@@ -1,4 +1,4 @@
-//! Parts of logs left out, torques that saturate or come late, as a user meets them.
+//! Parts of logs left out, torques that saturate, drift or come late, as a user meets them.
 #![allow(clippy::unwrap_used)]
 
 use clap::Parser;
@@ -190,4 +190,36 @@ fn identity_a_stated_delay_is_taken_out() {
             assert!(refused.contains(word), "`{word}` is not in: {refused}");
         }
     }
+}
+
+#[test]
+fn identity_a_torque_that_drifts_is_found_and_one_that_does_not_is_left_alone() {
+    let found = |drift: f64| {
+        let bench = Bench::new(&csv(|j, t, torque| {
+            let ripple = 0.4 * (11.0 * t).sin() + 0.3 * (17.3 * t).cos();
+            torque(t) + ripple + if j == 1 { drift * t / 20.0 } else { 0.0 }
+        }));
+        let json = bench.run("check", &["--json"]).unwrap();
+        let result: Value = serde_json::from_str(&json).unwrap();
+        let findings = result["logs"][0]["findings"].as_array().unwrap().clone();
+        let drifts = findings.into_iter().filter(|f| f["code"] == "torque-drift");
+        drifts.collect::<Vec<_>>()
+    };
+    assert_eq!(found(0.0), Vec::<Value>::new());
+    let drifting = found(20.0);
+    assert_eq!(drifting.len(), 1, "{drifting:#?}");
+    let size = drifting[0]["value"].as_f64().unwrap();
+    assert!((size / 20.0 - 1.0).abs() < 0.2, "{size}");
+    assert_eq!(drifting[0]["place"]["joint"], "elbow");
+}
+
+#[test]
+fn identity_few_independent_samples_are_told() {
+    let whole = csv(|_, t, torque| torque(t));
+    let part: Vec<&str> = whole.lines().take(201).collect();
+    let short = Bench::new(&(part.join("\n") + "\n"));
+    let said = short.run("check", &[]).unwrap();
+    assert!(said.contains("few-samples"), "{said}");
+    let long = Bench::new(&whole).run("check", &[]).unwrap();
+    assert!(!long.contains("few-samples"), "{long}");
 }

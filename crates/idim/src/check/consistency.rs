@@ -25,7 +25,7 @@ const SIMPLER: f64 = 0.4;
 /// Faults looked for one after another.
 const ROUNDS: usize = 4;
 /// Independent samples of all joints a column needs before the rigid body alone is enough to refuse a log.
-const ENOUGH: f64 = 10.0;
+pub(crate) const ENOUGH: f64 = 10.0;
 
 /// A fault, and why it is believed.
 #[derive(Debug, Clone)]
@@ -54,6 +54,13 @@ pub(crate) struct Examination {
     pub(crate) follows: Option<f64>,
     /// The arm moves too shortly to be sure of what its torques contradict.
     pub(crate) short: bool,
+    /// Independent samples of all joints, and columns they are to tell apart.
+    pub(crate) independent: (f64, usize),
+    /// Change of each torque column over the log that nothing in the motion explains, N·m, and the fall of the misfit; of a
+    /// single log.
+    pub(crate) drift: Vec<(f64, f64)>,
+    /// Fall of the misfit from which something is believed of this log.
+    pub(crate) believed: f64,
 }
 
 /// Tries all readings of a log's columns one fault away from `start`, then from what was found.
@@ -108,8 +115,12 @@ pub(crate) fn examine(
         fit = look.fit(&moments, &now);
     }
     let delay = look.delay(&now, fit.misfit);
+    let independent = robot.n_joints() as f64 * look.independent;
     Examination {
-        short: robot.n_joints() as f64 * look.independent < ENOUGH * maker.p as f64,
+        short: independent < ENOUGH * maker.p as f64,
+        independent: (independent, maker.p),
+        drift: look.drift(&now, &fit),
+        believed: look.needed(&fit),
         follows: prior::follows(samples, robot, &now),
         faults,
         plain: look.plain_errors(&now),
@@ -232,6 +243,43 @@ impl Look<'_> {
             0.0
         };
         Some(((at as f64 - f64::from(half) + off) * step, misfit - b))
+    }
+
+    /// How much better each joint's torque is predicted with a line over the log beside the rigid body: the size that the line
+    /// must have, and the fall of the logarithm of the error.
+    fn drift(&self, now: &Reading, fit: &Consistency) -> Vec<(f64, f64)> {
+        let [samples] = self.samples else {
+            return Vec::new();
+        };
+        let turned = self.maker.with_gravity(now.gravity);
+        let maker = turned.as_ref().unwrap_or(self.maker);
+        let (n, p) = (now.torque.len(), maker.p);
+        let (states, fastest) = samples.read_as(self.motors, &now.position, &now.position_scale);
+        let rows = self
+            .motors
+            .rows_of_columns(maker.rows(&states, &fastest), p);
+        let time = samples.moments_in_time();
+        let mut wider = Vec::with_capacity(rows.len() / p * (p + n));
+        for (at, row) in rows.chunks_exact(p).enumerate() {
+            wider.extend_from_slice(row);
+            wider.extend((0..n).map(|j| if j == at % n { time[at / n] } else { 0.0 }));
+        }
+        let torque = self.motors.columns(samples.torque.clone());
+        let moments = Moments::new(&wider, p + n, &torque, &samples.fold);
+        let moments = moments.with_positive(&maker.positive());
+        let share = self
+            .motors
+            .change_of_torques(&now.torque, &now.torque_scale);
+        let with = moments.fit(&share);
+        let spread = moments.deviations(&share);
+        (0..n)
+            .map(|j| {
+                let (before, after) = (fit.relative[j], with.relative[j]);
+                // A line from -a/2 to a/2 has the mean square a²/12.
+                let explained = (before.powi(2) - after.powi(2)).max(0.0);
+                ((12.0 * explained).sqrt() * spread[j], (before / after).ln())
+            })
+            .collect()
     }
 
     /// Held-out relative error of each joint's torque explained by sines, cosines, speeds and accelerations of all joints:

@@ -41,6 +41,7 @@ pub fn diagnose(logs: &[Log], robot: &Robot) -> Vec<Vec<Finding>> {
         let suspicions = shared(&usable, robot);
         let e = examine(&samples, robot, &start, &suspicions);
         of_all = verdict::findings(&e, robot, &names.join(" + "));
+        of_all.extend(verdict::few_samples(&e, &names.join(" + ")));
         together = Some(e);
     }
     let mut all: Vec<Vec<Finding>> = single
@@ -141,6 +142,10 @@ impl<'a> OneLog<'a> {
             of_another = verdict::is_of_another_robot(&own);
             judged = verdict::findings(&own, robot, file);
             judged.extend(verdict::delay(&own, file));
+            judged.extend(verdict::drift(&own, robot, file));
+            if together.is_none() {
+                judged.extend(verdict::few_samples(&own, file));
+            }
             reading = own.reading;
             faults.extend(own.faults);
         }

@@ -126,6 +126,18 @@ impl Samples {
         high - low
     }
 
+    /// When each sample was taken, from -1/2 at the first to 1/2 at the last.
+    pub(crate) fn moments_in_time(&self) -> Vec<f64> {
+        let time: Vec<f64> = self
+            .at
+            .iter()
+            .map(|&(s, k)| self.segments[s].time[k])
+            .collect();
+        let (first, last) = (time[0], time[time.len() - 1]);
+        let at = |t: &f64| (t - first) / (last - first) - 0.5;
+        time.iter().map(at).collect()
+    }
+
     /// Interval of the log, s.
     pub(crate) fn interval(&self) -> f64 {
         self.segments[self.at[0].0].interval

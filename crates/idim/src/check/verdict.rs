@@ -1,6 +1,6 @@
 //! What the rigid body's judgement of a log means, in findings.
 
-use super::consistency::Examination;
+use super::consistency::{ENOUGH, Examination};
 use super::faults::OF_THE_ROBOT;
 use idim_measurement::Place;
 use idim_measurement::doctor::{Finding, Severity};
@@ -99,6 +99,44 @@ pub(crate) fn delay(e: &Examination, file: &str) -> Option<Finding> {
             "take it out with --delay {:.1} (ms), or log both at one clock",
             1e3 * lag
         ),
+    })
+}
+
+/// Torques that drift over one log: a line beside the rigid body predicts held-out samples as much better as a fault would.
+/// Nothing is said of a log of another robot.
+pub(crate) fn drift(e: &Examination, robot: &Robot, file: &str) -> Vec<Finding> {
+    if is_of_another_robot(e) {
+        return Vec::new();
+    }
+    let joints = robot.joints().iter().zip(&e.drift);
+    joints
+        .filter(|(_, (_, gain))| *gain > e.believed)
+        .map(|(joint, &(size, _))| Finding {
+            code: "torque-drift",
+            severity: Severity::Warning,
+            place: Place::file(file).joint(&joint.name),
+            value: Some(size),
+            met: format!("the torque drifts by about {size:.3} over the log, whatever the arm does"),
+            rule: "the same motion takes the same torque at the beginning and at the end".into(),
+            next_step: "zero the sensor and warm the drive up before a run, or learn from a part of the log (FILE@A..B)".into(),
+        })
+        .collect()
+}
+
+/// Fewer independent samples than parameters need.
+pub(crate) fn few_samples(e: &Examination, file: &str) -> Option<Finding> {
+    let (samples, columns) = e.independent;
+    e.short.then(|| Finding {
+        code: "few-samples",
+        severity: Severity::Warning,
+        place: Place::file(file),
+        value: Some(samples / columns as f64),
+        met: format!(
+            "the arm moves for {samples:.0} independent samples of all joints, {:.1} a parameter of {columns}",
+            samples / columns as f64
+        ),
+        rule: format!("noise that remembers makes neighbours one sample; below {ENOUGH} a parameter intervals are wide and faults are hidden"),
+        next_step: "record a longer motion, or more of them".into(),
     })
 }
 

@@ -267,7 +267,7 @@ pub(crate) fn jumps(log: &Log, out: &mut Vec<Finding>) {
                 format!(
                     "a joint cannot move {JUMP} times as fast as ever else for one sample{hint}"
                 ),
-                "cut the log here, or unwrap the position",
+                "cut the log here (FILE@A..B, --exclude), or unwrap the position",
             ));
         }
         let torque = &drive(log)[j];
@@ -286,7 +286,7 @@ pub(crate) fn jumps(log: &Log, out: &mut Vec<Finding>) {
                 torque[k + 1],
                 format!("{spikes} torque samples stand out by {SPIKE} times the usual, the first is {:.4}", torque[k + 1]),
                 "one sample cannot be a torque",
-                "leave them out",
+                "leave them out with --exclude LOG:A..B",
             ));
         }
     }
