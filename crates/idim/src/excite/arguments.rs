@@ -9,12 +9,12 @@ use super::points::{PointOptions, excite_points};
 use super::points_text::{points_json, points_text};
 use super::text::excitation_text;
 use super::{ExciteOptions, excite_watched};
-use crate::check::Waiver;
 use crate::cli::{Column, RobotChanges, drive_columns, load, say};
 use crate::error::Error;
 use crate::load::LoadedRobot;
+use crate::log_options::ReadingArgs;
 use crate::log_spec::LogSpec;
-use crate::logs::{read_logs, read_mapping};
+use crate::logs::read_logs;
 use crate::output::{refuse_overwriting, results_folder};
 use crate::plots;
 use crate::progress::Progress;
@@ -24,7 +24,7 @@ use idim_excitation::{Criterion, Scaling};
 use idim_model::Robot;
 use idim_trajectory::{Limits, Motion};
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `excite`.
 #[derive(Debug, Clone, Args)]
@@ -99,12 +99,9 @@ pub struct ExciteArgs {
     /// Earlier log whose information counts: the motion becomes its best complement; may be repeated.
     #[arg(long, value_name = "LOG", num_args = 1.., value_parser = LogSpec::parse)]
     pub log: Vec<LogSpec>,
-    /// Which column of the logs holds what, where the header does not say so (docs/logs.md).
-    #[arg(long, alias = "map", value_name = "FILE", requires = "log")]
-    pub mapping: Option<PathBuf>,
-    /// Accept a finding of the log doctor by name, of all joints or of one; may be repeated.
-    #[arg(long, value_name = "CODE[:JOINT]", requires = "log")]
-    pub waive: Vec<Waiver>,
+    /// How those logs are read.
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Folder for results: DIR/ROBOT/motion.ron and others.
     #[arg(long, value_name = "DIR", default_value = "idim-out")]
     pub out: PathBuf,
@@ -206,8 +203,10 @@ fn run_fourier(
 ) -> Result<(), Error> {
     let robot = &loaded.robot;
     let noise = for_joints("--noise", &args.noise, robot.n_joints())?;
-    let mapping = read_mapping(args.mapping.as_ref())?;
-    let logs = read_logs(&args.log, loaded, &mapping, &args.waive)?;
+    let mapping = args.reading.mapping(&[&args.log])?;
+    let [logs] = args.reading.cut([&args.log])?;
+    let waivers = args.reading.waivers(robot)?;
+    let logs = read_logs(&logs, loaded, &mapping, waivers)?;
     let conditions = conditions(robot, args.torque_share, args.clearance, &args.may_touch)?;
     let options = ExciteOptions {
         criteria: args
@@ -318,6 +317,15 @@ fn check_family(args: &ExciteArgs) -> Result<(), Error> {
             *option,
             format!("--family {family}"),
             "it belongs to the other family; leave one of them out (docs/commands.md)",
+        ));
+    }
+    if args.log.is_empty()
+        && let Some(option) = args.reading.given().first()
+    {
+        return Err(Error::input(
+            *option,
+            "no --log",
+            "it says how earlier logs are read; name them by --log, or leave it out",
         ));
     }
     if args.family == Family::Points && args.criterion.len() > 1 {
