@@ -1,7 +1,7 @@
 //! The weights `D Y S` of a gradient, eight samples at a time.
 
 use faer::MatRef;
-use idim_model::{Columns, Model, RegressorBlock};
+use idim_model::{Columns, F64x8, Model, RegressorBlock};
 
 /// Columns computed together, so that an entry of `Y` is read once for all of them.
 const TOGETHER: usize = 4;
@@ -83,25 +83,64 @@ impl pulp::WithSimd for Contract<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, simd: S) {
-        let registers = RegressorBlock::LANES / S::F64_LANES;
+        let mut row = Vec::new();
         for (joint, reached) in self.plan.reached.iter().enumerate() {
             let weight = simd.splat_f64s(self.joint_weights[joint]);
+            // Side by side: every group of columns goes over them again.
+            row.clear();
+            row.extend(reached.iter().map(|&a| F64x8(*self.y.lanes(joint, a))));
             let groups = self.plan.s[joint].chunks_exact(reached.len().max(1));
             for (s, group) in groups.zip(reached.chunks(TOGETHER)) {
-                for r in 0..registers {
-                    let mut sums = [simd.splat_f64s(0.0); TOGETHER];
-                    for (row, &a) in s.iter().zip(reached) {
-                        let y = S::as_simd_f64s(self.y.lanes(joint, a)).0[r];
-                        for (sum, &s) in sums.iter_mut().zip(row) {
-                            *sum = simd.mul_add_f64s(y, simd.splat_f64s(s), *sum);
-                        }
-                    }
-                    for (&sum, &b) in sums.iter().zip(group) {
-                        let g = S::as_mut_simd_f64s(self.g.lanes_mut(joint, b)).0;
-                        g[r] = simd.mul_f64s(weight, sum);
-                    }
+                let registers = RegressorBlock::LANES / S::F64_LANES;
+                if registers == 1 {
+                    let [sums] = products::<S, 1>(simd, &row, s, 0);
+                    put::<S>(simd, self.g, (joint, group), 0, &sums, weight);
+                    continue;
+                }
+                for r in (0..registers).step_by(2) {
+                    let [first, second] = products::<S, 2>(simd, &row, s, r);
+                    put::<S>(simd, self.g, (joint, group), r, &first, weight);
+                    put::<S>(simd, self.g, (joint, group), r + 1, &second, weight);
                 }
             }
         }
+    }
+}
+
+/// Sums over a row of its entries times those of `s`, for `R` registers of samples from the `r`-th on: an entry of `s` is
+/// spread once for all of them.
+#[inline(always)]
+fn products<S: pulp::Simd, const R: usize>(
+    simd: S,
+    row: &[F64x8],
+    s: &[[f64; TOGETHER]],
+    r: usize,
+) -> [[S::f64s; TOGETHER]; R] {
+    let mut sums = [[simd.splat_f64s(0.0); TOGETHER]; R];
+    for (y, s) in row.iter().zip(s) {
+        let y = S::as_simd_f64s(&y.0).0;
+        for (k, &s) in s.iter().enumerate() {
+            let s = simd.splat_f64s(s);
+            for q in 0..R {
+                sums[q][k] = simd.mul_add_f64s(y[r + q], s, sums[q][k]);
+            }
+        }
+    }
+    sums
+}
+
+/// Writes weighted sums to a register of their columns.
+#[inline(always)]
+fn put<S: pulp::Simd>(
+    simd: S,
+    g: &mut RegressorBlock,
+    (joint, group): (usize, &[usize]),
+    r: usize,
+    sums: &[S::f64s; TOGETHER],
+    weight: S::f64s,
+) {
+    for (&sum, &b) in sums.iter().zip(group) {
+        let g = S::as_mut_simd_f64s(g.lanes_mut(joint, b)).0;
+        g[r] = simd.mul_f64s(weight, sum);
     }
 }

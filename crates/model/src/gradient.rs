@@ -5,6 +5,7 @@
 //! dynamics for all derivatives of a sample, and no derivative of Y is ever formed.
 
 use crate::adjoint::{JointBar, beyond_bar, frame_bar, wrench_bar};
+use crate::axes::Kinematics;
 use crate::frame::LinkPose;
 use crate::kinematics::{LinkMotion, Screw, Travel, zero_motion, zero_screw};
 use crate::lane::{Kernel, Lane, read, zero};
@@ -13,7 +14,6 @@ use crate::newton_euler::{link_wrench, splat_ten};
 use crate::packing::Rows;
 use crate::parameter::{Columns, ParameterKind};
 use crate::plan::Plan;
-use crate::projection::Kinematics;
 use crate::regressor::{Fill, RegressorBlock};
 use crate::states::{JointStates, LaneStates, eight};
 use crate::wide::{F64x8, over_eight};

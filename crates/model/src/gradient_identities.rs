@@ -1,7 +1,8 @@
 //! Gradients against derivatives of the regressor by dual numbers.
 
+use crate::axes::Kinematics;
 use crate::packing::Rows;
-use crate::projection::{Kinematics, fill};
+use crate::projection::fill;
 use crate::testing::{Dual, dual, robot_and_state};
 use crate::*;
 use proptest::prelude::*;

@@ -254,7 +254,7 @@ proptest! {
                 model: &model,
                 rows: target.all(),
                 state: states.state(),
-                kinematics: &mut crate::projection::Kinematics::new(&model, ends),
+                kinematics: &mut crate::axes::Kinematics::new(&model, ends),
                 cells: &mut rows,
             };
             crate::wide::over_eight_on(arch, &mut fill);

@@ -27,6 +27,7 @@
 //! What it does not do: rank decisions (`idim-base-params`), trajectories, estimation, file access.
 
 mod adjoint;
+mod axes;
 mod energy;
 mod error;
 mod frame;

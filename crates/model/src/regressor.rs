@@ -1,10 +1,11 @@
 //! The torque regressor: joint torque per unit of each parameter, for one sample and in blocks of eight.
 
+use crate::axes::Kinematics;
 use crate::lane::{Kernel, Lane};
 use crate::model::Model;
 use crate::packing::{Rows, Target};
 use crate::parameter::Columns;
-use crate::projection::{Kinematics, fill};
+use crate::projection::fill;
 use crate::states::{JointState, JointStates, LaneStates};
 use crate::wide::{F64x8, over_eight, over_one};
 use nalgebra::DMatrix;
@@ -168,11 +169,13 @@ impl RegressorBlock {
     }
 
     /// One entry of the regressor for the eight samples; beyond `n_samples` the last sample is repeated.
+    #[inline]
     pub fn lanes(&self, joint: usize, column: usize) -> &[f64; 8] {
         &self.entries[self.places[joint * self.n_columns + column]].0
     }
 
     /// One entry for the eight samples, to fill in: of a block of weights.
+    #[inline]
     pub fn lanes_mut(&mut self, joint: usize, column: usize) -> &mut [f64; 8] {
         &mut self.entries[self.places[joint * self.n_columns + column]].0
     }

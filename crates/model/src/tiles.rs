@@ -1,10 +1,10 @@
 //! The torque regressor of many samples, laid out for products of its columns.
 
+use crate::axes::Kinematics;
 use crate::model::Model;
 use crate::packing::{Packing, ROOM, Target};
 use crate::parameter::Columns;
 use crate::plan::Plan;
-use crate::projection::Kinematics;
 use crate::regressor::Fill;
 use crate::states::{JointStates, LaneStates, eight};
 use crate::wide::F64x8;
