@@ -41,6 +41,7 @@ mod dual;
 mod eigenvalues;
 mod energy;
 mod energy_gradient;
+mod entry_bound;
 mod error;
 mod fourier;
 mod fourier_chart;

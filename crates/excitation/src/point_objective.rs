@@ -1,6 +1,7 @@
 //! A criterion of chained points as a smooth function on a box, with its exact gradient.
 
 use crate::criterion::{Criterion, Scaling};
+use crate::entry_bound::EntryBound;
 use crate::point_rows::PointRows;
 use crate::schatten::SchattenCondition;
 use crate::spectrum::SmoothCriterion;
@@ -8,10 +9,11 @@ use crate::{EnergyDesign, padded};
 use faer::MatRef;
 
 /// The function an optimiser lowers: `x` in `[-1, 1]` of every design variable to the logarithm of the criterion,
-/// plus what the entries of `W` may not be.
+/// plus what the entries of `W` may not be. Where `S` has a weight, `x` has one more variable: its bound.
 #[derive(Debug, Clone)]
 pub(crate) struct PointObjective<'a> {
     rows: PointRows<'a>,
+    asked: Criterion,
     smooth: Smooth,
     n_rows: usize,
     n_columns: usize,
@@ -32,19 +34,8 @@ enum Smooth {
     Spectral(SmoothCriterion, Vec<f64>),
 }
 
-/// `S = max|W| / min|W| <= limit` as an augmented Lagrangian: `1 - limit |w| / max|W| <= 0` of every entry.
-#[derive(Debug, Clone)]
-struct EntryBound {
-    limit: f64,
-    /// Share of the limit that is aimed at.
-    aim: f64,
-    weight: f64,
-    /// One an entry of the padded `W`.
-    multipliers: Vec<f64>,
-}
-
 impl<'a> PointObjective<'a> {
-    /// `None` when the criterion is not smooth.
+    /// `None` when the criterion is not smooth. A weighted sum takes no limit: its `S` is bounded by a variable.
     pub(crate) fn new(
         design: &'a EnergyDesign,
         n_rows: usize,
@@ -53,8 +44,17 @@ impl<'a> PointObjective<'a> {
     ) -> Option<Self> {
         let b = design.n_columns();
         let n_entries = n_rows * padded::stride(b);
+        let entries = match criterion {
+            Criterion::WeightedSum {
+                condition,
+                equilibrium,
+            } => Some(EntryBound::weighed([condition, equilibrium], n_entries)),
+            _ => limit_of_equilibrium.map(|limit| EntryBound::limited(limit, n_entries)),
+        };
         let smooth = match criterion {
-            Criterion::TwoNorm(Scaling::Raw) => Smooth::Condition(SchattenCondition::new(b)),
+            Criterion::TwoNorm(Scaling::Raw) | Criterion::WeightedSum { .. } => {
+                Smooth::Condition(SchattenCondition::new(b))
+            }
             other => {
                 let information = vec![0.0; b * padded::stride(b)];
                 Smooth::Spectral(SmoothCriterion::new(other)?, information)
@@ -67,6 +67,7 @@ impl<'a> PointObjective<'a> {
         };
         Some(Self {
             rows: PointRows::new(design, n_rows),
+            asked: criterion,
             smooth,
             n_rows,
             n_columns: b,
@@ -74,26 +75,29 @@ impl<'a> PointObjective<'a> {
             high: each(|range| range[1]),
             values: vec![0.0; (n_rows + 1) * ranges.len()],
             by_rows: vec![0.0; n_entries],
-            entries: limit_of_equilibrium.map(|limit| EntryBound {
-                limit,
-                aim: 1.0,
-                weight: 0.0,
-                multipliers: vec![0.0; n_entries],
-            }),
+            entries,
             n_evaluations: 0,
         })
+    }
+
+    /// The criterion that is lowered.
+    pub(crate) fn asked(&self) -> Criterion {
+        self.asked
     }
 
     pub(crate) fn n_evaluations(&self) -> usize {
         self.n_evaluations
     }
 
-    /// Design variables `(q, q̇)` of every point at `x`.
+    /// Design variables `(q, q̇)` of every point at `x`; a further variable is the bound of `S`.
     pub(crate) fn values(&mut self, x: &[f64]) -> &[f64] {
         for (i, value) in self.values.iter_mut().enumerate() {
             let (low, high) = (self.low[i], self.high[i]);
             // Never beyond a limit by rounding.
             *value = (f64::midpoint(low, high) + 0.5 * (high - low) * x[i]).clamp(low, high);
+        }
+        if let (Some(entries), Some(&x)) = (&mut self.entries, x.get(self.values.len())) {
+            entries.set_variable(x);
         }
         &self.values
     }
@@ -108,13 +112,17 @@ impl<'a> PointObjective<'a> {
             gradient.fill(0.0);
             return f64::INFINITY;
         }
+        let mut by_bound = 0.0;
         if let Some(entries) = &self.entries {
-            value += entries.penalty(self.rows.w(), self.n_columns, &mut self.by_rows);
+            (value, by_bound) =
+                entries.add_to(value, self.rows.w(), self.n_columns, &mut self.by_rows);
         }
-        self.rows.pull_back(&self.by_rows, gradient);
-        for (i, g) in gradient.iter_mut().enumerate() {
+        let (by_points, further) = gradient.split_at_mut(self.values.len());
+        self.rows.pull_back(&self.by_rows, by_points);
+        for (i, g) in by_points.iter_mut().enumerate() {
             *g *= 0.5 * (self.high[i] - self.low[i]);
         }
+        further.fill(by_bound);
         value
     }
 
@@ -149,16 +157,18 @@ impl<'a> PointObjective<'a> {
 
     /// By how much of its limit `S` of the rows last computed exceeds it; zero where it is held and without one.
     pub(crate) fn excess_of_equilibrium(&self) -> f64 {
-        let Some(entries) = &self.entries else {
-            return 0.0;
-        };
-        let w = self.rows.w();
-        let stride = padded::stride(self.n_columns);
-        let smallest = w
-            .chunks_exact(stride)
-            .flat_map(|row| &row[..self.n_columns])
-            .fold(f64::INFINITY, |a, w| a.min(w.abs()));
-        (largest_entry(w).1 / smallest / entries.limit - 1.0).max(0.0)
+        let (w, n) = (self.rows.w(), self.n_columns);
+        self.entries.as_ref().map_or(0.0, |e| e.excess(w, n))
+    }
+
+    /// The variable that bounds `S` where it has a weight: from an earlier bound, or to suit a condition number.
+    pub(crate) fn variable_of_bound(&self, earlier: Option<f64>, condition: f64) -> Option<f64> {
+        self.entries.as_ref()?.variable(earlier, condition)
+    }
+
+    /// What that variable last was, as a bound.
+    pub(crate) fn variable_bound(&self) -> Option<f64> {
+        self.entries.as_ref()?.variable_limit()
     }
 
     /// Share of the limit of `S` that is aimed at from now on.
@@ -171,56 +181,16 @@ impl<'a> PointObjective<'a> {
     /// Starts over with the weight of the bound on the entries of `W`.
     pub(crate) fn set_weight(&mut self, weight: f64) {
         if let Some(entries) = &mut self.entries {
-            entries.weight = weight;
-            entries.multipliers.fill(0.0);
+            entries.set_weight(weight);
         }
     }
 
     /// Moves the multipliers of the bound on the entries to the rows last computed.
     pub(crate) fn update_multipliers(&mut self) {
         if let Some(entries) = &mut self.entries {
-            let w = self.rows.w();
-            let smallest = largest_entry(w).1 / (entries.aim * entries.limit);
-            for (multiplier, w) in entries.multipliers.iter_mut().zip(w) {
-                let violation = 1.0 - w.abs() / smallest;
-                *multiplier = (*multiplier + entries.weight * violation).max(0.0);
-            }
+            entries.update_multipliers(self.rows.w());
         }
     }
-}
-
-impl EntryBound {
-    /// `Σ (max(0, μ + ρ c)² - μ²) / 2ρ` with `c = 1 - |w| limit / max|W|`; adds its derivative to `by_rows`.
-    fn penalty(&self, w: &[f64], n_columns: usize, by_rows: &mut [f64]) -> f64 {
-        if self.weight == 0.0 {
-            return 0.0;
-        }
-        let stride = padded::stride(n_columns);
-        let (at, largest) = largest_entry(w);
-        let limit = self.aim * self.limit;
-        let smallest = largest / limit;
-        let (mut value, mut by_smallest) = (0.0, 0.0);
-        for i in (0..w.len()).filter(|i| i % stride < n_columns) {
-            let multiplier = self.multipliers[i];
-            let active = (multiplier + self.weight * (1.0 - w[i].abs() / smallest)).max(0.0);
-            value += (active * active - multiplier * multiplier) / (2.0 * self.weight);
-            by_rows[i] -= active * w[i].signum() / smallest;
-            by_smallest += active * w[i].abs() / (smallest * smallest);
-        }
-        by_rows[at] += by_smallest * w[at].signum() / limit;
-        value
-    }
-}
-
-/// Where the entry of largest magnitude is, and the magnitude.
-fn largest_entry(w: &[f64]) -> (usize, f64) {
-    let mut largest = (0, 0.0);
-    for (i, w) in w.iter().enumerate() {
-        if w.abs() > largest.1 {
-            largest = (i, w.abs());
-        }
-    }
-    largest
 }
 
 #[cfg(test)]
@@ -300,19 +270,25 @@ mod tests {
         }
     }
 
-    #[test]
-    fn identity_gradient_of_every_criterion_by_dual_numbers() {
+    const ROWS: usize = 9;
+
+    /// Variables of a chain and a direction to move them in.
+    fn chain_and_direction() -> (Vec<f64>, Vec<f64>) {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let n = design().n_variables() * (ROWS + 1);
+        let x = (0..n).map(|_| rng.random_range(-0.9..0.9)).collect();
+        let direction = (0..n).map(|_| rng.random_range(-1.0..1.0)).collect();
+        (x, direction)
+    }
+
+    /// The energy differences of such a chain.
+    fn dual_rows(x: &[f64], direction: &[f64]) -> Vec<Vec<Dual>> {
         let robot = robot_from_ron(idim_fixtures::PLANAR2R).unwrap();
         let (design, columns) = (design(), columns());
-        let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let (n, n_rows) = (design.n_variables(), 9);
+        let n = design.n_variables();
         let positions = design.position_variables();
         let ranges: Vec<[f64; 2]> = design.ranges().collect();
-        let x: Vec<f64> = (0..n * (n_rows + 1))
-            .map(|_| rng.random_range(-0.9..0.9))
-            .collect();
-        let direction: Vec<f64> = x.iter().map(|_| rng.random_range(-1.0..1.0)).collect();
-        let energies: Vec<Vec<Dual>> = (0..=n_rows)
+        let energies: Vec<Vec<Dual>> = (0..=ROWS)
             .map(|point| {
                 let (mut q, mut qd) = (vec![Dual::ZERO; 2], vec![Dual::ZERO; 2]);
                 for (k, [low, high]) in ranges.iter().enumerate() {
@@ -327,31 +303,87 @@ mod tests {
                 energy_row(&robot, &columns, &q, &qd)
             })
             .collect();
-        let rows = energies.windows(2).map(|e| {
-            let difference = e[1].iter().zip(&e[0]).map(|(b, a)| *b - *a);
-            (1.0, difference.collect())
-        });
-        let a = gram(&rows.collect::<Vec<_>>());
+        let difference = |e: &[Vec<Dual>]| e[1].iter().zip(&e[0]).map(|(b, a)| *b - *a).collect();
+        energies.windows(2).map(difference).collect()
+    }
+
+    /// The logarithm of a criterion of those rows, at the power `2^3`.
+    fn dual_logarithm(criterion: Criterion, rows: &[Vec<Dual>]) -> Dual {
+        let extremes = match criterion {
+            Criterion::TwoNorm(Scaling::Raw) => Extremes::Traces(8.0),
+            _ => Extremes::Norm(8.0),
+        };
+        let rows: Vec<_> = rows.iter().map(|row| (1.0, row.clone())).collect();
+        logarithm(criterion, extremes, gram(&rows), ROWS)
+    }
+
+    fn assert_value_and_slope(objective: &mut PointObjective<'_>, at: [&[f64]; 2], expected: Dual) {
+        let [x, direction] = at;
+        let mut gradient = vec![0.0; x.len()];
+        let value = objective.value_and_gradient(x, 3, &mut gradient);
+        let slope = crate::dense::dot(&gradient, direction);
+        let criterion = objective.asked();
+        assert!(
+            (value - expected.re).abs() < AGREEMENT,
+            "{criterion:?}: {value} {expected:?}"
+        );
+        let error = (slope - expected.du).abs();
+        assert!(
+            error < AGREEMENT * slope.abs().max(1.0),
+            "{criterion:?}: {slope} {expected:?}"
+        );
+    }
+
+    #[test]
+    fn identity_gradient_of_every_criterion_by_dual_numbers() {
+        let design = design();
+        let (x, direction) = chain_and_direction();
+        let rows = dual_rows(&x, &direction);
         for criterion in SMOOTH {
-            let extremes = match criterion {
-                Criterion::TwoNorm(Scaling::Raw) => Extremes::Traces(8.0),
-                _ => Extremes::Norm(8.0),
-            };
-            let expected = logarithm(criterion, extremes, a.clone(), n_rows);
-            let mut objective = PointObjective::new(&design, n_rows, criterion, None).unwrap();
-            let mut gradient = vec![0.0; x.len()];
-            let value = objective.value_and_gradient(&x, 3, &mut gradient);
-            let slope = crate::dense::dot(&gradient, &direction);
-            assert!(
-                (value - expected.re).abs() < AGREEMENT,
-                "{criterion:?}: {value} {expected:?}"
-            );
-            let error = (slope - expected.du).abs();
-            assert!(
-                error < AGREEMENT * slope.abs().max(1.0),
-                "{criterion:?}: {slope} {expected:?}"
-            );
+            let expected = dual_logarithm(criterion, &rows);
+            let mut objective = PointObjective::new(&design, ROWS, criterion, None).unwrap();
+            assert_value_and_slope(&mut objective, [&x, &direction], expected);
         }
+    }
+
+    #[test]
+    fn identity_gradient_of_the_weighted_sum_by_dual_numbers() {
+        let design = design();
+        let (mut x, mut direction) = chain_and_direction();
+        let rows = dual_rows(&x, &direction);
+        let cond = dual_logarithm(Criterion::TwoNorm(Scaling::Raw), &rows);
+        let sum = Criterion::WeightedSum {
+            condition: 2.0,
+            equilibrium: 0.3,
+        };
+        let mut objective = PointObjective::new(&design, ROWS, sum, None).unwrap();
+        let (weight, bound) = (0.4, 20.0_f64);
+        objective.set_weight(weight);
+        x.push(objective.variable_of_bound(Some(bound), 1.0).unwrap());
+        direction.push(0.2);
+        // One more unit of the variable is fifteen of the logarithm of the bound.
+        let s = dual(bound, 15.0 * 0.2 * bound);
+        let exp = |a: Dual| dual(a.re.exp(), a.re.exp() * a.du);
+        let magnitudes: Vec<Dual> = rows.iter().flatten().map(|w| *w * w.re.signum()).collect();
+        let largest = *magnitudes
+            .iter()
+            .max_by(|a, b| a.re.total_cmp(&b.re))
+            .unwrap();
+        let violations = magnitudes.iter().map(|w| dual(1.0, 0.0) - *w * s / largest);
+        let violations: Vec<Dual> = violations.filter(|c| c.re > 0.0).collect();
+        assert!(!violations.is_empty() && violations.len() < magnitudes.len());
+        let logarithm = (exp(cond) * 2.0 + s * 0.3).ln();
+        // Without multipliers ρ c² / 2, and with μ = ρ c of this very place: ((μ + ρ c)² - μ²) / 2ρ.
+        let plain = violations.iter().map(|c| *c * *c * (0.5 * weight));
+        let expected = plain.fold(logarithm, std::ops::Add::add);
+        assert_value_and_slope(&mut objective, [&x, &direction], expected);
+        objective.update_multipliers();
+        let augmented = violations.iter().map(|c| {
+            let (multiplier, active) = (c.re * weight, *c * weight + dual(c.re * weight, 0.0));
+            (active * active - dual(multiplier * multiplier, 0.0)) * (0.5 / weight)
+        });
+        let expected = augmented.fold(logarithm, std::ops::Add::add);
+        assert_value_and_slope(&mut objective, [&x, &direction], expected);
     }
 
     #[test]

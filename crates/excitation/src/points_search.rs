@@ -15,9 +15,10 @@ use std::ops::{ControlFlow, Range};
 pub struct PointSearchOptions {
     /// Rows `r`: one fewer than points, at least the number of base columns.
     pub n_rows: usize,
-    /// What is lowered: one of the smooth criteria (2-norm, Frobenius, log det, trace, worst direction).
+    /// What is lowered: one of the smooth criteria (2-norm, Frobenius, log det, trace, worst direction), or a weighted
+    /// sum of the condition number and `S`.
     pub criterion: Criterion,
-    /// `S = max|W| / min|W|` at most this; `None` leaves it free. The paper's optimum has 175.
+    /// `S = max|W| / min|W|` at most this; `None` leaves it free. The paper's optimum has 175. Not beside a weighted sum.
     pub limit_of_equilibrium: Option<f64>,
     /// Random starts. Typical 100.
     pub n_starts: usize,
@@ -35,7 +36,7 @@ pub struct SearchProgress {
     /// Rounds of the whole search.
     pub n_rounds: usize,
     /// Best value of the criterion so far; made worse by what exceeds a limit of `S`, which comes in after a quarter of
-    /// the rounds.
+    /// the rounds. Of a weighted sum the condition number alone until then.
     pub best: f64,
 }
 
@@ -45,10 +46,10 @@ const ROUND: usize = 16;
 const POOL: usize = 10;
 /// The best of them that are taken to the bottom: the order may still change by a percent there.
 const POLISHED: usize = 4;
-/// With `S` limited, one round in this many comes first without the limit: good chains that it is then imposed on
+/// With `S` limited or weighed, one round in this many comes first without the limit: good chains that it is then imposed on
 /// are far better than what it leaves of random ones.
 const FREE_ROUNDS: usize = 4;
-/// With `S` limited, one descent in this many starts again from a chain found without the limit.
+/// With `S` limited or weighed, one descent in this many starts again from a chain found without the limit.
 const IMPOSED: usize = 4;
 
 /// Lowers a smooth criterion over chained points from many starts with exact gradients and limits as a box.
@@ -58,40 +59,37 @@ const IMPOSED: usize = 4;
 /// the result: points that hold it are preferred to all others.
 ///
 /// # Errors
-/// A criterion without a gradient, no start, fewer rows than base columns, a limit of `S` that is not above one.
+/// A criterion without a gradient, no start, fewer rows than base columns, a limit of `S` that is not above one or beside
+/// a weight, a weight that is not above zero.
 pub fn search_points(
     design: &EnergyDesign,
     options: &PointSearchOptions,
     progress: &mut dyn FnMut(SearchProgress) -> ControlFlow<()>,
 ) -> Result<PointDesign, Error> {
-    let free = check(design, options, None)?;
+    check(design, options)?;
+    let (target, mut n_free) = (objective(design, options)?, options.n_rounds);
+    let mut free = target.clone();
+    if restrained(options) {
+        n_free /= FREE_ROUNDS;
+        free = objective(design, &without_restraint(options))?;
+    }
     let (mut search, initial_conditions) = Search::start(design, options, &free);
-    let n_free = match options.limit_of_equilibrium {
-        Some(_) => options.n_rounds / FREE_ROUNDS,
-        None => options.n_rounds,
-    };
     let mut go_on = search.rounds(0..n_free, &free, &FREE, progress);
-    let mut objective = free;
-    if let Some(limit) = options.limit_of_equilibrium {
-        objective = check(design, options, Some(limit))?;
-        search.impose(&objective);
+    if restrained(options) {
+        search.impose(&target);
         if go_on.is_continue() {
-            go_on = search.rounds(n_free..options.n_rounds, &objective, &LIMITED, progress);
+            go_on = search.rounds(n_free..options.n_rounds, &target, &LIMITED, progress);
         }
     }
     if go_on.is_continue() {
         // The last round is told of too; there is nothing left to stop.
         let _ = progress(search.progress(options.n_rounds));
     }
-    search.polish(&objective);
-    Ok(search.finish(objective, initial_conditions))
+    search.polish(&target);
+    Ok(search.finish(target, initial_conditions))
 }
 
-fn check<'a>(
-    design: &'a EnergyDesign,
-    options: &PointSearchOptions,
-    limit: Option<f64>,
-) -> Result<PointObjective<'a>, Error> {
+fn check(design: &EnergyDesign, options: &PointSearchOptions) -> Result<(), Error> {
     let (rows, columns) = (options.n_rows, design.n_columns());
     if rows < columns {
         return Err(Error::input(
@@ -112,13 +110,69 @@ fn check<'a>(
             "max|W| / min|W| is above one; give a larger limit or none",
         ));
     }
-    PointObjective::new(design, rows, options.criterion, limit).ok_or_else(|| {
+    let Criterion::WeightedSum {
+        condition,
+        equilibrium,
+    } = options.criterion
+    else {
+        return Ok(());
+    };
+    if ![condition, equilibrium]
+        .iter()
+        .all(|l| *l > 0.0 && l.is_finite())
+    {
+        return Err(Error::input(
+            "weights of the condition number and of S",
+            format!("{condition}, {equilibrium}"),
+            "both must be above zero; for the condition number alone lower that",
+        ));
+    }
+    if let Some(limit) = options.limit_of_equilibrium {
+        return Err(Error::input(
+            "limit of S",
+            format!("{limit}, and a weight of S"),
+            "S is either limited or weighed; leave one of them out",
+        ));
+    }
+    Ok(())
+}
+
+/// What a search lowers.
+fn objective<'a>(
+    design: &'a EnergyDesign,
+    options: &PointSearchOptions,
+) -> Result<PointObjective<'a>, Error> {
+    let PointSearchOptions {
+        n_rows,
+        criterion,
+        limit_of_equilibrium,
+        ..
+    } = *options;
+    PointObjective::new(design, n_rows, criterion, limit_of_equilibrium).ok_or_else(|| {
         Error::input(
             "criterion",
-            format!("{:?}", options.criterion),
+            format!("{criterion:?}"),
             "it has no gradient; choose the 2-norm, Frobenius, log det, trace or worst direction",
         )
     })
+}
+
+/// Whether `S` has a limit or a weight.
+fn restrained(options: &PointSearchOptions) -> bool {
+    options.limit_of_equilibrium.is_some()
+        || matches!(options.criterion, Criterion::WeightedSum { .. })
+}
+
+/// The same search with `S` as it comes.
+fn without_restraint(options: &PointSearchOptions) -> PointSearchOptions {
+    PointSearchOptions {
+        criterion: match options.criterion {
+            Criterion::WeightedSum { .. } => Criterion::TwoNorm(Scaling::Raw),
+            other => other,
+        },
+        limit_of_equilibrium: None,
+        ..options.clone()
+    }
 }
 
 /// What a search has so far.
@@ -127,7 +181,7 @@ struct Search<'a> {
     options: &'a PointSearchOptions,
     /// Best first.
     pool: Vec<Candidate>,
-    /// Where `S` is limited: what was found before it was.
+    /// Where `S` is limited or weighed: what was found before it was.
     without_limit: Vec<Candidate>,
     n_evaluations: usize,
 }
@@ -145,7 +199,7 @@ impl<'a> Search<'a> {
                 let x = random_start(design, options.n_rows, &mut stream(options.seed, start));
                 let mut objective = objective.clone();
                 let initial = objective.criterion(&x, Criterion::TwoNorm(Scaling::Raw));
-                let found = Candidate::descend(objective, options.criterion, x, &FREE.coarse);
+                let found = Candidate::descend(objective, x, None, &FREE.coarse);
                 (found, initial)
             })
             .collect();
@@ -221,48 +275,36 @@ impl<'a> Search<'a> {
         let n_positions = self.design.position_variables().len();
         let n_variables = self.design.n_variables();
         disturb(&mut x, &family[other].x, n_positions, n_variables, rng);
-        let child = Candidate::descend(objective.clone(), self.options.criterion, x, schedule);
+        let from = Some(&family[parent]);
+        let child = Candidate::descend(objective.clone(), x, from, schedule);
         // One from outside the pool stands against the worst of it.
         let against = if again { self.pool.len() - 1 } else { parent };
         (against, child)
     }
 
-    /// Takes the pool down again under the limit of `S`.
+    /// Takes the pool down again under the limit of `S`, or with its weight.
     fn impose(&mut self, objective: &PointObjective<'_>) {
         self.without_limit = std::mem::take(&mut self.pool);
-        self.pool = self.descend_all(&self.without_limit, objective, &LIMITED.coarse);
+        self.pool = descend_all(&self.without_limit, objective, &LIMITED.coarse);
         self.count_and_sort();
     }
 
     /// Takes the best of the pool to the bottom.
     fn polish(&mut self, objective: &PointObjective<'_>) {
-        let schedules = match self.options.limit_of_equilibrium {
-            Some(_) => &LIMITED,
-            None => &FREE,
+        let schedules = if restrained(self.options) {
+            &LIMITED
+        } else {
+            &FREE
         };
         self.pool.truncate(POLISHED);
         let before = std::mem::take(&mut self.pool);
-        self.pool = self.descend_all(&before, objective, &schedules.polish);
+        self.pool = descend_all(&before, objective, &schedules.polish);
         self.count_and_sort();
         // Kept where polishing made nothing better; points that hold the limit come before all that do not.
         self.pool.extend(before);
         self.pool
             .sort_by(|a, b| (!a.held).cmp(&!b.held).then(a.merit.total_cmp(&b.merit)));
         self.pool.truncate(POLISHED);
-    }
-
-    fn descend_all(
-        &self,
-        from: &[Candidate],
-        objective: &PointObjective<'_>,
-        schedule: &Schedule,
-    ) -> Vec<Candidate> {
-        from.par_iter()
-            .map(|c| {
-                let x = c.x.clone();
-                Candidate::descend(objective.clone(), self.options.criterion, x, schedule)
-            })
-            .collect()
     }
 
     fn count_and_sort(&mut self) {
@@ -287,6 +329,17 @@ impl<'a> Search<'a> {
             n_evaluations: self.n_evaluations,
         }
     }
+}
+
+/// Every one of them taken down.
+fn descend_all(
+    from: &[Candidate],
+    objective: &PointObjective<'_>,
+    schedule: &Schedule,
+) -> Vec<Candidate> {
+    from.par_iter()
+        .map(|c| Candidate::descend(objective.clone(), c.x.clone(), Some(c), schedule))
+        .collect()
 }
 
 /// Random numbers of one descent: the same whichever thread takes it.

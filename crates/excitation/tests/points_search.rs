@@ -77,6 +77,27 @@ fn identity_a_limit_of_equilibrium_is_held() {
 }
 
 #[test]
+fn oracle_a_weighted_sum_below_that_of_the_published_points() {
+    // The paper's points have Cond 11.16 and S 175, inside limits it does not state; it prints no weights.
+    let [condition, equilibrium] = [1.0, 1.0];
+    let found = search(&PointSearchOptions {
+        criterion: Criterion::WeightedSum {
+            condition,
+            equilibrium,
+        },
+        n_starts: 4,
+        n_rounds: 1,
+        ..options(30)
+    });
+    let s = found.conditioning.equilibrium.unwrap().ratio;
+    let sum = condition * found.conditioning.raw.two_norm + equilibrium * s;
+    assert!(sum < 11.16 + 175.0, "{sum}");
+    // What is told is the sum itself, no surrogate.
+    assert!((found.values[0] / sum - 1.0).abs() < 1e-9);
+    assert_inside_limits(&found);
+}
+
+#[test]
 fn identity_each_criterion_is_best_at_its_own_optimum() {
     let criteria = [
         Criterion::TwoNorm(Scaling::Raw),
@@ -139,6 +160,13 @@ fn identity_a_search_can_be_stopped_and_keeps_its_best() {
 
 #[test]
 fn regress_searches_that_cannot_work_are_refused() {
+    let weighed = |equilibrium| PointSearchOptions {
+        criterion: Criterion::WeightedSum {
+            condition: 1.0,
+            equilibrium,
+        },
+        ..options(20)
+    };
     let wrong = [
         PointSearchOptions {
             criterion: Criterion::Equilibrium,
@@ -152,6 +180,12 @@ fn regress_searches_that_cannot_work_are_refused() {
             limit_of_equilibrium: Some(0.5),
             ..options(20)
         },
+        PointSearchOptions {
+            limit_of_equilibrium: Some(100.0),
+            ..weighed(1.0)
+        },
+        weighed(0.0),
+        weighed(f64::INFINITY),
         options(14),
     ];
     for options in wrong {

@@ -27,7 +27,7 @@ pub enum Command {
     /// Write the log that a robot with known inertia would leave behind.
     Simulate(SimulateArgs),
     /// Design the motion that reveals most, inside all limits.
-    Excite(ExciteArgs),
+    Excite(Box<ExciteArgs>),
     /// Find the load on an arm from runs without and with it.
     Payload(LoadedRuns),
     /// Find what each drive's signal is worth, from runs without and with a load of known mass.

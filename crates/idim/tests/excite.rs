@@ -385,11 +385,49 @@ fn identity_exciting_points_and_a_certified_path_through_them() {
     refused(&["--log", "log.csv"], &["--log"]);
     refused(&["--torque-share", "0.5"], &["--torque-share"]);
     refused(&["--rows", "5"], &["5", "6 base columns"]);
-    refused(&["--criterion", "d,e"], &["by one"]);
+    refused(&["--criterion", "d,e"], &["by one", "--lambda"]);
     refused(&["--largest-s", "1"], &["limit of S"]);
     let message = bench.excite("refused", &[&LIMITS[..], &["--rows", "20"]].concat());
     assert!(message.unwrap_err().contains("--rows"));
     assert!(!bench.path("refused").exists());
+}
+
+#[test]
+fn identity_exciting_points_for_a_weighted_sum_of_cond_and_s() {
+    let bench = Bench::new();
+    let (robot, out) = (bench.path("arm.ron"), bench.path("out"));
+    let (robot, out) = (robot.to_str().unwrap(), out.to_str().unwrap());
+    let ask = |more: &[&str]| {
+        let files = ["--robot", robot, "--out", out];
+        let quick = ["--starts", "2", "--rounds", "1"];
+        run(&[&files[..], &quick, &LIMITS, more].concat())
+    };
+    let points = |more: &[&'static str]| [&["--family", "points"][..], more].concat();
+    let refused = |more: &[&str], words: &[&str]| {
+        let message = ask(more).unwrap_err();
+        for word in words {
+            assert!(message.contains(word), "`{word}` is not in: {message}");
+        }
+    };
+    refused(&["--lambda", "1,0.1"], &["sampled", "--family points"]);
+    refused(&points(&["--lambda", "1"]), &["two weights", "1,0.1"]);
+    refused(&points(&["--lambda", "1,-2"]), &["above zero"]);
+    let weighs = ["--lambda", "1,2", "--criterion", "d"];
+    refused(&points(&weighs), &["against cond", "--criterion"]);
+    let both = ["--lambda", "1,2", "--largest-s", "60"];
+    refused(&points(&both), &["--largest-s", "either"]);
+    assert!(!bench.path("out").exists());
+    let text = ask(&points(&["--lambda", "1,0.5"])).unwrap();
+    assert!(text.contains("lowered: 1 cond + 0.5 S"), "{text}");
+    let certificate: serde_json::Value =
+        serde_json::from_str(&bench.file("out", "certificate.json")).unwrap();
+    let number = |v: &serde_json::Value| v.as_f64().unwrap();
+    let (criteria, search) = (&certificate["criteria"], &certificate["search"]);
+    let s = number(&criteria["equilibrium"]["ratio"]);
+    let sum = number(&criteria["condition_number"]["raw"]) + 0.5 * s;
+    assert_eq!(search["criterion"], "1 cond + 0.5 S");
+    assert!((number(&search["value"]) / sum - 1.0).abs() < 1e-12);
+    assert!(sum < number(&search["best_random"]));
 }
 
 #[test]

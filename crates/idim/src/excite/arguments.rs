@@ -54,11 +54,14 @@ pub struct ExciteArgs {
     /// Largest S = max |W| / min |W| of points (default: any; 175 in the paper).
     #[arg(long, value_name = "S")]
     pub largest_s: Option<f64>,
+    /// Lower L1 Cond + L2 S of points, the criterion of Gautier & Khalil (example: 1,0.1).
+    #[arg(long, value_name = "L1,L2", value_parser = parse_lambda)]
+    pub lambda: Option<Lambda>,
     /// Searches of a round (default: 8); random starts of points (default: 32, with a time budget 10).
     #[arg(long, value_name = "N")]
     pub starts: Option<usize>,
     /// Rounds of searches from beside the best, after the first (default: 2, with a time budget as many as it allows; of
-    /// points 12, with a time budget as many as it allows, with --largest-s at most 48).
+    /// points 12, with a time budget as many as it allows, with --largest-s or --lambda at most 48).
     #[arg(long, value_name = "N")]
     pub rounds: Option<usize>,
     /// Seed of everything random.
@@ -128,6 +131,10 @@ pub struct CriterionTerm {
     pub weight: f64,
 }
 
+/// `λ₁` and `λ₂` of a condition number and `S`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lambda(pub f64, pub f64);
+
 /// Criteria by the names of the command line.
 pub(super) const CRITERIA: [(&str, Criterion); 7] = [
     ("cond", Criterion::TwoNorm(Scaling::Raw)),
@@ -162,6 +169,19 @@ fn parse_term(text: &str) -> Result<CriterionTerm, String> {
         criterion: *criterion,
         weight,
     })
+}
+
+fn parse_lambda(text: &str) -> Result<Lambda, String> {
+    let weights: Vec<f64> = text
+        .split(',')
+        .map(|w| w.trim().parse().unwrap_or(f64::NAN))
+        .collect();
+    match weights[..] {
+        [a, b] if [a, b].iter().all(|w| *w > 0.0 && w.is_finite()) => Ok(Lambda(a, b)),
+        _ => Err(format!(
+            "`{text}`: give two weights above zero, of the condition number and of S, for example 1,0.1"
+        )),
+    }
 }
 
 fn parse_pair(text: &str) -> Result<(String, String), String> {
@@ -256,13 +276,20 @@ fn run_points(
     (progress, watch): (&Progress, &Watch),
     out: &mut dyn Write,
 ) -> Result<(), Error> {
-    let rounds = match (args.time_budget, args.largest_s) {
+    let restrained = args.largest_s.is_some() || args.lambda.is_some();
+    let rounds = match (args.time_budget, restrained) {
         (None, _) => POINT_ROUNDS[0],
-        (Some(_), Some(_)) => POINT_ROUNDS[1],
-        (Some(_), None) => POINT_ROUNDS[2],
+        (Some(_), true) => POINT_ROUNDS[1],
+        (Some(_), false) => POINT_ROUNDS[2],
     };
     let options = PointOptions {
-        criterion: args.criterion[0].criterion,
+        criterion: match args.lambda {
+            None => args.criterion[0].criterion,
+            Some(Lambda(condition, equilibrium)) => Criterion::WeightedSum {
+                condition,
+                equilibrium,
+            },
+        },
         n_rows: args.rows,
         largest_s: args.largest_s,
         n_starts: args.starts.unwrap_or(match args.time_budget {
@@ -332,14 +359,46 @@ fn check_family(args: &ExciteArgs) -> Result<(), Error> {
         return Err(Error::input(
             "--criterion",
             format!("{} criteria", args.criterion.len()),
-            "points are searched for by one; --largest-s limits S beside it",
+            "points are searched for by one; --largest-s limits S beside it, --lambda weighs S against cond",
         ));
+    }
+    Ok(())
+}
+
+/// `S` with a weight: of points, and beside their condition number only.
+fn check_lambda(args: &ExciteArgs) -> Result<(), Error> {
+    let Some(Lambda(condition, equilibrium)) = args.lambda else {
+        return Ok(());
+    };
+    let refused = |value: &str, rule| {
+        let option = format!("--lambda {condition},{equilibrium}");
+        Err(Error::input(option, value, rule))
+    };
+    if args.family == Family::Fourier {
+        return refused(
+            "--family fourier",
+            "S of a periodic motion is set by when it is sampled (a row near zero more, and S is another); \
+             take --family points, or leave it out",
+        );
+    }
+    if args.criterion[0].criterion != Criterion::TwoNorm(Scaling::Raw) {
+        return refused(
+            "another --criterion",
+            "it weighs S against cond and no other; leave one of them out",
+        );
+    }
+    if args.largest_s.is_some() {
+        return refused(
+            "--largest-s",
+            "S is either weighed or limited; leave one of them out",
+        );
     }
     Ok(())
 }
 
 fn check(args: &ExciteArgs) -> Result<(), Error> {
     check_family(args)?;
+    check_lambda(args)?;
     let (period, harmonics) = (
         args.period.unwrap_or(PERIOD),
         args.harmonics.unwrap_or(HARMONICS),
@@ -388,5 +447,5 @@ const HARMONICS: usize = 5;
 const STARTS: usize = 8;
 /// Random starts of points without a time budget, and with one, whose rounds make up for it.
 const POINT_STARTS: [usize; 2] = [32, 10];
-/// Rounds of points: without a time budget; with one and a limit of S, that a quarter of them comes before; with one alone.
+/// Rounds of points: without a time budget; with one and a limit or weight of S, that a quarter of them comes before; with one alone.
 const POINT_ROUNDS: [usize; 3] = [12, 48, 1 << 20];

@@ -83,8 +83,17 @@ fn of(criterion: Criterion, c: &Conditioning) -> f64 {
         Criterion::LogDet => -c.log_det,
         Criterion::TraceInverse => c.trace_inverse,
         Criterion::WorstDirection => 1.0 / c.smallest_singular_value,
-        Criterion::Equilibrium | Criterion::WeightedSum { .. } => f64::NAN,
+        Criterion::Equilibrium => s_of(c),
+        Criterion::WeightedSum {
+            condition,
+            equilibrium,
+        } => condition * c.raw.two_norm + equilibrium * s_of(c),
     }
+}
+
+/// `S`, which is always looked at where there are rows.
+fn s_of(c: &Conditioning) -> f64 {
+    c.equilibrium.map_or(f64::NAN, |s| s.ratio)
 }
 
 /// Searches for points, and again under smaller limits while the path through them leaves its own.

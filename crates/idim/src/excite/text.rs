@@ -57,7 +57,7 @@ pub(super) fn excitation_text(robot: &Robot, found: &Excitation) -> String {
 pub(super) fn criterion_name(found: &Excitation) -> String {
     let terms = &found.options.criteria;
     if let [(_, criterion)] = terms[..] {
-        return term_name(criterion).into();
+        return term_name(criterion);
     }
     let parts = terms
         .iter()
@@ -66,9 +66,16 @@ pub(super) fn criterion_name(found: &Excitation) -> String {
 }
 
 /// One criterion in those words.
-pub(super) fn term_name(criterion: Criterion) -> &'static str {
+pub(super) fn term_name(criterion: Criterion) -> String {
+    if let Criterion::WeightedSum {
+        condition,
+        equilibrium,
+    } = criterion
+    {
+        return format!("{condition} cond + {equilibrium} S");
+    }
     let known = CRITERIA.iter().find(|c| c.1 == criterion);
-    known.map_or("?", |c| c.0)
+    known.map_or("?", |c| c.0).into()
 }
 
 fn search_text(found: &Excitation) -> String {
