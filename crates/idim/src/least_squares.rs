@@ -68,9 +68,9 @@ pub fn running_qr(
             return;
         }
         let count = block.n_samples() * n;
+        block.copy_rows(&mut rows[..count * p]);
         for (k, row) in rows.chunks_exact_mut(p).take(count).enumerate() {
             let (joint, sample) = (k % n, k / n);
-            block.copy_row(joint, sample, row);
             for x in &mut *row {
                 *x *= roots[joint];
             }

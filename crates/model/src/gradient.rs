@@ -14,6 +14,7 @@ use crate::newton_euler::{link_wrench, splat_ten};
 use crate::packing::Rows;
 use crate::parameter::{Columns, ParameterKind};
 use crate::plan::Plan;
+use crate::projection::BLOCKS;
 use crate::regressor::{Fill, RegressorBlock};
 use crate::states::{JointStates, LaneStates, eight};
 use crate::wide::{F64x8, over_eight};
@@ -110,7 +111,7 @@ pub fn regressor_contraction_gradient(
     over_lanes(model, states, |first, lanes, work| {
         y.move_to(first, states.n_samples());
         g.move_to(first, states.n_samples());
-        let fill = Fill::<_, true> {
+        let fill = Fill::<_, BLOCKS> {
             model,
             rows: rows.all(),
             state: lanes.state(),

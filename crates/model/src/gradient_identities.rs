@@ -2,7 +2,7 @@
 
 use crate::axes::Kinematics;
 use crate::packing::Rows;
-use crate::projection::fill;
+use crate::projection::{BLOCKS, fill};
 use crate::testing::{Dual, dual, robot_and_state};
 use crate::*;
 use proptest::prelude::*;
@@ -32,7 +32,7 @@ fn regressor_derivatives(model: &Model, columns: &Columns, s: &JointState) -> Ve
             let mut cells = vec![dual(0.0, 0.0); rows.n_cells];
             let mut kinematics = Kinematics::new(model, [dual(0.0, 0.0), dual(1.0, 0.0)]);
             let state = [&q[..], &qd, &qdd];
-            fill::<Dual, true>((), model, rows.all(), state, &mut kinematics, &mut cells);
+            fill::<Dual, BLOCKS>((), model, rows.all(), state, &mut kinematics, &mut cells);
             rows.places.iter().map(|&place| cells[place]).collect()
         })
         .collect()

@@ -250,7 +250,7 @@ proptest! {
         for arch in crate::testing::architectures() {
             let mut rows = vec![crate::wide::F64x8::ZERO; target.n_cells];
             let ends = [crate::wide::F64x8::ZERO, crate::wide::F64x8::ONE];
-            let mut fill = crate::regressor::Fill::<_, true> {
+            let mut fill = crate::regressor::Fill::<_, { crate::projection::BLOCKS }> {
                 model: &model,
                 rows: target.all(),
                 state: states.state(),

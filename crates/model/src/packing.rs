@@ -14,6 +14,51 @@ pub(crate) struct Target<'a> {
     pub(crate) drives: &'a [usize],
 }
 
+/// Rows of all columns, one after another.
+#[derive(Debug, Clone)]
+pub(crate) struct DenseRows {
+    pub(crate) plan: Plan,
+    links: Vec<usize>,
+    drives: Vec<usize>,
+}
+
+impl DenseRows {
+    #[track_caller]
+    pub(crate) fn new(model: &Model, columns: &Columns) -> Self {
+        let (n, p) = (model.n_joints(), columns.len());
+        let mut links = vec![0; n * n];
+        for j in 0..n {
+            for (first, &joint) in links[j * n..].iter_mut().zip(model.path(j)) {
+                *first = joint * p;
+            }
+        }
+        Self {
+            plan: Plan::new(model, columns),
+            links,
+            drives: (0..n).map(|joint| joint * p).collect(),
+        }
+    }
+
+    #[inline]
+    pub(crate) fn all(&self) -> Target<'_> {
+        Target {
+            plan: &self.plan,
+            links: &self.links,
+            drives: &self.drives,
+        }
+    }
+
+    /// Fills in the columns that stand elsewhere already.
+    pub(crate) fn repeat(&self, model: &Model, rows: &mut [f64]) {
+        for twin in &self.plan.twins {
+            for &joint in model.path(twin.link) {
+                let row = &mut rows[joint * self.plan.n_columns..];
+                row[twin.column] = row[twin.first];
+            }
+        }
+    }
+}
+
 /// Cells beyond the last entry: a link's ten must fit wherever it begins. They stay zero.
 pub(crate) const ROOM: usize = 10;
 
@@ -23,8 +68,10 @@ pub(crate) struct Rows {
     pub(crate) plan: Plan,
     links: Vec<usize>,
     drives: Vec<usize>,
-    /// At `joint * n_columns + column`: the cell of that entry; one that stays zero where it is zero.
+    /// At `joint * n_columns + column`: the cell of that entry.
     pub(crate) places: Vec<usize>,
+    /// The cell of all entries that are always zero.
+    pub(crate) nothing: usize,
     pub(crate) n_cells: usize,
 }
 
@@ -75,6 +122,7 @@ impl Rows {
             drives,
             plan,
             places,
+            nothing: end,
             n_cells: end + ROOM,
         }
     }

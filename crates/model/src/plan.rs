@@ -23,6 +23,7 @@ pub(crate) struct Twin {
     pub(crate) entry: usize,
     pub(crate) negated: bool,
     pub(crate) column: usize,
+    pub(crate) first: usize,
 }
 
 /// Columns of a link, by the place of the entry among the ten.
@@ -30,7 +31,7 @@ pub(crate) struct Twin {
 pub(crate) struct LinkPlan {
     /// Bit k: entry k is asked for.
     pub(crate) wanted: u16,
-    column: [usize; 10],
+    pub(crate) column: [usize; 10],
     /// -0 where the column is the entry's negative, else 0: to flip its sign by.
     pub(crate) sign: [f64; 10],
 }
@@ -108,6 +109,7 @@ impl Plan {
                     entry,
                     negated: sign < 0.0,
                     column,
+                    first: link.column[entry],
                 });
                 continue;
             }

@@ -15,10 +15,18 @@ use crate::parameter::ParameterKind;
 use crate::plan::{ALL, ASK, BASE_XX, BASE_YY, LinkPlan};
 use crate::robot::JointKind;
 use crate::wrench_map::{ABOUT_Z, ACROSS, ANY, SLIDE, WrenchMap};
+use std::ops::Range;
 
-/// Writes the entries that can be other than zero, with their columns' signs or without.
+/// Rows of tiles: packed, without the columns' signs.
+pub(crate) const TILES: u8 = 0;
+/// Rows of blocks: packed, with signs.
+pub(crate) const BLOCKS: u8 = 1;
+/// Rows of all columns, with signs.
+pub(crate) const DENSE: u8 = 2;
+
+/// Writes the entries that can be other than zero.
 #[inline(always)]
-pub(crate) fn fill<T: Lane, const SIGNED: bool>(
+pub(crate) fn fill<T: Lane, const ROWS: u8>(
     at: T::At,
     model: &Model,
     target: Target<'_>,
@@ -38,11 +46,13 @@ pub(crate) fn fill<T: Lane, const SIGNED: bool>(
                 joint,
                 link,
                 rows,
+                n_columns: target.plan.n_columns,
             };
-            of.project::<T, SIGNED>(at, kinematics, cells);
+            of.project::<T, ROWS>(at, kinematics, cells);
         }
-        for (d, &(kind, _)) in target.plan.drives[j].iter().enumerate() {
-            let cell = &mut cells[target.drives[j] + d];
+        for (d, &(kind, column)) in target.plan.drives[j].iter().enumerate() {
+            let place = if ROWS == DENSE { column } else { d };
+            let cell = &mut cells[target.drives[j] + place];
             for part in 0..T::PARTS {
                 let at = T::part(at, part);
                 let entry = match kind {
@@ -64,12 +74,13 @@ struct OfLink<'a> {
     link: &'a LinkPlan,
     /// Its first cell in the row of every joint on its path.
     rows: &'a [usize],
+    n_columns: usize,
 }
 
 impl OfLink<'_> {
     /// The rows' entries for the link's columns, compiled once for each set of them that is frequent.
     #[inline(always)]
-    fn project<T: Lane, const SIGNED: bool>(
+    fn project<T: Lane, const ROWS: u8>(
         &self,
         at: T::At,
         kinematics: &mut Kinematics<T::Cell>,
@@ -81,87 +92,92 @@ impl OfLink<'_> {
             ..
         } = &self.joint.link
         {
-            return self.project_posed::<T>(at, (rotation, *translation), kinematics, cells);
+            return self.project_posed::<T, ROWS>(at, (rotation, *translation), kinematics, cells);
         }
         match self.link.wanted {
-            BASE_XX => self.project_along::<T, BASE_XX, SIGNED>(at, kinematics, cells),
-            BASE_YY => self.project_along::<T, BASE_YY, SIGNED>(at, kinematics, cells),
-            ALL => self.project_along::<T, ALL, SIGNED>(at, kinematics, cells),
-            _ => self.project_along::<T, ASK, SIGNED>(at, kinematics, cells),
+            BASE_XX => self.project_along::<T, BASE_XX, ROWS>(at, kinematics, cells),
+            BASE_YY => self.project_along::<T, BASE_YY, ROWS>(at, kinematics, cells),
+            ALL => self.project_along::<T, ALL, ROWS>(at, kinematics, cells),
+            _ => self.project_along::<T, ASK, ROWS>(at, kinematics, cells),
         }
     }
 
     /// Rows of a link whose axes are along those of its joint's frame.
     #[inline(always)]
-    fn project_along<T: Lane, const WANTED: u16, const SIGNED: bool>(
+    fn project_along<T: Lane, const WANTED: u16, const ROWS: u8>(
         &self,
         at: T::At,
         kinematics: &Kinematics<T::Cell>,
         cells: &mut [T::Cell],
     ) {
         let first = self.j * kinematics.n;
-        let linear = &kinematics.linear[first..][..self.rows.len()];
-        let direction = &kinematics.direction[first..][..kinematics.n];
         let map = &kinematics.map;
         let Some((own, others)) = self.joint.directions.split_last() else {
             return;
         };
-        for (d, v) in others.iter().zip(direction) {
-            let (rows, f) = (&self.rows[d.range.clone()], &linear[d.range.clone()]);
+        for d in others {
+            let axes = d.range.start..d.range.end;
             match (d.kind, d.across) {
                 (JointKind::Prismatic, _) => {
-                    self.project_slide::<T, WANTED, SIGNED>(at, rows, v, map, cells);
+                    let v = &kinematics.direction[first + d.index];
+                    self.project_slide::<T, WANTED, ROWS>(at, axes, v, map, cells);
                 }
-                (_, true) => {
-                    self.project_direction::<T, ACROSS, WANTED, SIGNED>(
-                        at,
-                        rows,
-                        (v, f),
-                        map,
-                        cells,
-                    );
-                }
-                _ => self.project_direction::<T, ANY, WANTED, SIGNED>(at, rows, (v, f), map, cells),
+                (_, true) => self.project_direction::<T, ACROSS, WANTED, ROWS>(
+                    at,
+                    (d.index, axes),
+                    kinematics,
+                    cells,
+                ),
+                _ => self.project_direction::<T, ANY, WANTED, ROWS>(
+                    at,
+                    (d.index, axes),
+                    kinematics,
+                    cells,
+                ),
             }
         }
-        let (rows, f) = (&self.rows[own.range.clone()], &linear[own.range.clone()]);
-        let v = &direction[own.index];
+        let v = &kinematics.direction[first + own.index];
+        let (axes, last) = (own.range.start..own.range.end - 1, own.range.end - 1);
         if own.kind == JointKind::Prismatic {
-            return self.project_slide::<T, WANTED, SIGNED>(at, rows, v, map, cells);
+            return self.project_slide::<T, WANTED, ROWS>(at, last..last + 1, v, map, cells);
         }
-        let (Some((last, rows)), Some((_, f))) = (rows.split_last(), f.split_last()) else {
-            return;
-        };
-        self.project_direction::<T, ABOUT_Z, WANTED, SIGNED>(at, rows, (v, f), map, cells);
-        let row = window(cells, *last);
+        self.project_direction::<T, ABOUT_Z, WANTED, ROWS>(
+            at,
+            (own.index, axes),
+            kinematics,
+            cells,
+        );
+        let row = self.row::<_, ROWS>(last, cells);
         for part in 0..T::PARTS {
             let at = T::part(at, part);
             let tensor = self.tensor::<T, ABOUT_Z, WANTED>(at, read(at, v), map);
-            self.put_tensor::<T, WANTED, SIGNED>(at, row, &tensor);
+            self.put_tensor::<T, WANTED, ROWS>(at, row, &tensor);
             let [x, y] = [T::read(at, &map.a[0]), T::read(at, &map.a[1])];
-            self.put::<T, WANTED, SIGNED>(at, 6, row, y);
-            self.put::<T, WANTED, SIGNED>(at, 7, row, -x);
+            self.put::<T, WANTED, ROWS>(at, 6, row, y);
+            self.put::<T, WANTED, ROWS>(at, 7, row, -x);
         }
     }
 
     /// Rows of parallel revolute joints: what the tensor's columns say is the same in all of them.
     #[inline(always)]
-    fn project_direction<T: Lane, const FORM: u8, const WANTED: u16, const SIGNED: bool>(
+    fn project_direction<T: Lane, const FORM: u8, const WANTED: u16, const ROWS: u8>(
         &self,
         at: T::At,
-        rows: &[usize],
-        (v, linear): (&V3<T::Cell>, &[V3<T::Cell>]),
-        map: &WrenchMap<T::Cell>,
+        (direction, axes): (usize, Range<usize>),
+        kinematics: &Kinematics<T::Cell>,
         cells: &mut [T::Cell],
     ) {
+        let first = self.j * kinematics.n;
+        let map = &kinematics.map;
         for part in 0..T::PARTS {
             let at = T::part(at, part);
-            let v = read(at, v);
+            let v = read(at, &kinematics.direction[first + direction]);
             let tensor = self.tensor::<T, FORM, WANTED>(at, v, map);
-            for (&row, f) in rows.iter().zip(linear) {
-                let (row, f) = (window(cells, row), read(at, f));
-                self.put_tensor::<T, WANTED, SIGNED>(at, row, &tensor);
-                self.put_moments::<T, FORM, WANTED, SIGNED>(at, row, (v, f), map);
+            for k in axes.start..axes.end {
+                let row = self.row::<_, ROWS>(k, cells);
+                let f = read(at, &kinematics.linear[first + k]);
+                self.put_tensor::<T, WANTED, ROWS>(at, row, &tensor);
+                self.put_moments::<T, FORM, WANTED, ROWS>(at, row, (v, f), map);
             }
         }
     }
@@ -202,73 +218,73 @@ impl OfLink<'_> {
     }
 
     #[inline(always)]
-    fn put_tensor<T: Lane, const WANTED: u16, const SIGNED: bool>(
+    fn put_tensor<T: Lane, const WANTED: u16, const ROWS: u8>(
         &self,
         at: T::At,
-        row: &mut [T::Cell; ROOM],
+        row: &mut [T::Cell],
         tensor: &[T; 6],
     ) {
-        self.put::<T, WANTED, SIGNED>(at, 0, row, tensor[0]);
-        self.put::<T, WANTED, SIGNED>(at, 1, row, tensor[1]);
-        self.put::<T, WANTED, SIGNED>(at, 2, row, tensor[2]);
-        self.put::<T, WANTED, SIGNED>(at, 3, row, tensor[3]);
-        self.put::<T, WANTED, SIGNED>(at, 4, row, tensor[4]);
-        self.put::<T, WANTED, SIGNED>(at, 5, row, tensor[5]);
+        self.put::<T, WANTED, ROWS>(at, 0, row, tensor[0]);
+        self.put::<T, WANTED, ROWS>(at, 1, row, tensor[1]);
+        self.put::<T, WANTED, ROWS>(at, 2, row, tensor[2]);
+        self.put::<T, WANTED, ROWS>(at, 3, row, tensor[3]);
+        self.put::<T, WANTED, ROWS>(at, 4, row, tensor[4]);
+        self.put::<T, WANTED, ROWS>(at, 5, row, tensor[5]);
     }
 
     #[inline(always)]
-    fn put_moments<T: Lane, const FORM: u8, const WANTED: u16, const SIGNED: bool>(
+    fn put_moments<T: Lane, const FORM: u8, const WANTED: u16, const ROWS: u8>(
         &self,
         at: T::At,
-        row: &mut [T::Cell; ROOM],
+        row: &mut [T::Cell],
         axis: (V3<T>, V3<T>),
         map: &WrenchMap<T::Cell>,
     ) {
-        self.put_moment::<T, FORM, WANTED, SIGNED>(at, 6, row, axis, map);
-        self.put_moment::<T, FORM, WANTED, SIGNED>(at, 7, row, axis, map);
-        self.put_moment::<T, FORM, WANTED, SIGNED>(at, 8, row, axis, map);
-        self.put_moment::<T, FORM, WANTED, SIGNED>(at, 9, row, axis, map);
+        self.put_moment::<T, FORM, WANTED, ROWS>(at, 6, row, axis, map);
+        self.put_moment::<T, FORM, WANTED, ROWS>(at, 7, row, axis, map);
+        self.put_moment::<T, FORM, WANTED, ROWS>(at, 8, row, axis, map);
+        self.put_moment::<T, FORM, WANTED, ROWS>(at, 9, row, axis, map);
     }
 
     #[inline(always)]
-    fn put_moment<T: Lane, const FORM: u8, const WANTED: u16, const SIGNED: bool>(
+    fn put_moment<T: Lane, const FORM: u8, const WANTED: u16, const ROWS: u8>(
         &self,
         at: T::At,
         k: usize,
-        row: &mut [T::Cell; ROOM],
+        row: &mut [T::Cell],
         (v, f): (V3<T>, V3<T>),
         map: &WrenchMap<T::Cell>,
     ) {
         if self.link.wants::<WANTED>(k) {
             let entry = map.moment_entry::<T, FORM>(at, k, v, f);
-            self.put::<T, WANTED, SIGNED>(at, k, row, entry);
+            self.put::<T, WANTED, ROWS>(at, k, row, entry);
         }
     }
 
     /// Row of a slide along `v`: it feels no turning.
     #[inline(always)]
-    fn project_slide<T: Lane, const WANTED: u16, const SIGNED: bool>(
+    fn project_slide<T: Lane, const WANTED: u16, const ROWS: u8>(
         &self,
         at: T::At,
-        rows: &[usize],
+        axes: Range<usize>,
         v: &V3<T::Cell>,
         map: &WrenchMap<T::Cell>,
         cells: &mut [T::Cell],
     ) {
-        for &row in rows {
-            let row = window(cells, row);
+        for k in axes {
+            let row = self.row::<_, ROWS>(k, cells);
             for part in 0..T::PARTS {
                 let at = T::part(at, part);
                 // As if the axis had no angular part.
                 let axis = (zero(at), read(at, v));
-                self.put_moments::<T, SLIDE, WANTED, SIGNED>(at, row, axis, map);
+                self.put_moments::<T, SLIDE, WANTED, ROWS>(at, row, axis, map);
             }
         }
     }
 
     /// Rows of a link whose frame stands apart from its joint's.
     #[inline(always)]
-    fn project_posed<T: Lane>(
+    fn project_posed<T: Lane, const ROWS: u8>(
         &self,
         at: T::At,
         (rotation, translation): (&[[f64; 3]; 3], [f64; 3]),
@@ -284,11 +300,11 @@ impl OfLink<'_> {
                 for k in d.range.clone() {
                     let axis = kinematics.axis::<T>(at, self.j, d, k);
                     let axis = axis.at(rotation, translation);
-                    let (map, row) = (&kinematics.map, window(cells, self.rows[k]));
+                    let (map, row) = (&kinematics.map, self.row::<_, ROWS>(k, cells));
                     let tensor = self.tensor::<T, ANY, ASK>(at, axis.angular, map);
-                    self.put_tensor::<T, ASK, false>(at, row, &tensor);
+                    self.put_tensor::<T, ASK, ROWS>(at, row, &tensor);
                     let axis = (axis.angular, axis.linear);
-                    self.put_moments::<T, ANY, ASK, false>(at, row, axis, map);
+                    self.put_moments::<T, ANY, ASK, ROWS>(at, row, axis, map);
                 }
             }
         }
@@ -296,30 +312,40 @@ impl OfLink<'_> {
 
     /// Writes an entry to its place, if it is wanted.
     #[inline(always)]
-    fn put<T: Lane, const WANTED: u16, const SIGNED: bool>(
+    fn put<T: Lane, const WANTED: u16, const ROWS: u8>(
         &self,
         at: T::At,
         k: usize,
-        row: &mut [T::Cell; ROOM],
+        row: &mut [T::Cell],
         value: T,
     ) {
         if !self.link.wants::<WANTED>(k) {
             return;
         }
-        let value = if SIGNED {
-            value.flipped(self.link.sign[k])
-        } else {
+        let value = if ROWS == TILES {
             value
+        } else {
+            value.flipped(self.link.sign[k])
         };
-        value.write(at, &mut row[self.link.rank::<WANTED>(k)]);
+        let place = if ROWS == DENSE {
+            self.link.column[k]
+        } else {
+            self.link.rank::<WANTED>(k)
+        };
+        value.write(at, &mut row[place]);
     }
-}
 
-/// The cells a link's entries lie in: the index is checked here, once.
-#[inline(always)]
-fn window<C>(cells: &mut [C], first: usize) -> &mut [C; ROOM] {
-    let Some(window) = cells[first..].first_chunk_mut() else {
-        panic!("no room for the entries of a link");
-    };
-    window
+    /// The cells a link's entries lie in, in the row of the `k`-th joint on its path.
+    #[inline(always)]
+    fn row<'c, C, const ROWS: u8>(&self, k: usize, cells: &'c mut [C]) -> &'c mut [C] {
+        let cells = &mut cells[self.rows[k]..];
+        if ROWS == DENSE {
+            return &mut cells[..self.n_columns];
+        }
+        // Of a length that is known: checked here, once.
+        let Some(window) = cells.first_chunk_mut::<ROOM>() else {
+            panic!("no room for the entries of a link");
+        };
+        window
+    }
 }

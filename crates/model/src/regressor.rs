@@ -3,9 +3,9 @@
 use crate::axes::Kinematics;
 use crate::lane::{Kernel, Lane};
 use crate::model::Model;
-use crate::packing::{Rows, Target};
+use crate::packing::{DenseRows, Rows, Target};
 use crate::parameter::Columns;
-use crate::projection::fill;
+use crate::projection::{BLOCKS, DENSE, fill};
 use crate::states::{JointState, JointStates, LaneStates};
 use crate::wide::{F64x8, over_eight, over_one};
 use nalgebra::DMatrix;
@@ -35,9 +35,8 @@ pub fn torque_regressor(model: &Model, columns: &Columns, state: &JointState) ->
 /// Room for [`torque_regressor_into`], and the plan of the columns: made once, used for many samples.
 #[derive(Debug, Clone)]
 pub struct RegressorWorkspace {
-    rows: Rows,
+    rows: DenseRows,
     kinematics: Kinematics<f64>,
-    cells: Vec<f64>,
 }
 
 impl RegressorWorkspace {
@@ -47,25 +46,22 @@ impl RegressorWorkspace {
     /// If a column does not fit the model.
     #[track_caller]
     pub fn new(model: &Model, columns: &Columns) -> Self {
-        let rows = Rows::new(model, columns);
         Self {
-            cells: vec![0.0; rows.n_cells],
-            rows,
+            rows: DenseRows::new(model, columns),
             kinematics: Kinematics::new(model, [0.0, 1.0]),
         }
     }
 
     fn fill_rows(&mut self, model: &Model, state: &JointState, out: &mut [f64]) {
-        over_one(&mut Fill::<_, true> {
+        out.fill(0.0);
+        over_one(&mut Fill::<_, DENSE> {
             model,
             rows: self.rows.all(),
             state: [&state.q, &state.qd, &state.qdd],
             kinematics: &mut self.kinematics,
-            cells: &mut self.cells,
+            cells: out,
         });
-        for (entry, &place) in out.iter_mut().zip(&self.rows.places) {
-            *entry = self.cells[place];
-        }
+        self.rows.repeat(model, out);
     }
 }
 
@@ -103,6 +99,8 @@ pub struct RegressorBlock {
     n_columns: usize,
     /// At `joint * n_columns + column`: where the entry is.
     places: Vec<usize>,
+    /// The place of all entries that are always zero.
+    nothing: usize,
     entries: Vec<F64x8>,
 }
 
@@ -118,6 +116,7 @@ impl RegressorBlock {
             n_joints: rows.plan.links.len(),
             n_columns: rows.plan.n_columns,
             places: rows.places.clone(),
+            nothing: rows.nothing,
             entries: vec![F64x8::ZERO; rows.n_cells],
         }
     }
@@ -130,6 +129,7 @@ impl RegressorBlock {
             n_joints,
             n_columns,
             places: (0..n_joints * n_columns).collect(),
+            nothing: usize::MAX,
             entries: vec![F64x8::ZERO; n_joints * n_columns],
         }
     }
@@ -178,6 +178,30 @@ impl RegressorBlock {
     #[inline]
     pub fn lanes_mut(&mut self, joint: usize, column: usize) -> &mut [f64; 8] {
         &mut self.entries[self.places[joint * self.n_columns + column]].0
+    }
+
+    /// All rows of all samples of the block, `n_samples × n_joints × n_columns`: for each sample joint by joint.
+    ///
+    /// # Panics
+    /// If `out` does not have that length.
+    #[track_caller]
+    pub fn copy_rows(&self, out: &mut [f64]) {
+        let of_sample = self.n_joints * self.n_columns;
+        assert_eq!(
+            out.len(),
+            self.n_samples * of_sample,
+            "out is not samples × joints × columns"
+        );
+        out.fill(0.0);
+        for (entry, &place) in self.places.iter().enumerate() {
+            if place == self.nothing {
+                continue;
+            }
+            let lanes = &self.entries[place].0;
+            for (rows, x) in out.chunks_exact_mut(of_sample.max(1)).zip(lanes) {
+                rows[entry] = *x;
+            }
+        }
     }
 
     /// One row of one sample.
@@ -259,7 +283,7 @@ impl BlockFiller {
     ) {
         block.move_to(first, states.n_samples());
         self.lanes.load(states, first);
-        let fill = Fill::<_, true> {
+        let fill = Fill::<_, BLOCKS> {
             model,
             rows: self.rows.all(),
             state: self.lanes.state(),
@@ -294,7 +318,7 @@ pub fn observation_matrix(model: &Model, columns: &Columns, states: &JointStates
 }
 
 /// [`fill`] as one operation to be compiled for an instruction set.
-pub(crate) struct Fill<'a, C, const SIGNED: bool> {
+pub(crate) struct Fill<'a, C, const ROWS: u8> {
     pub(crate) model: &'a Model,
     pub(crate) rows: Target<'a>,
     pub(crate) state: [&'a [C]; 3],
@@ -302,7 +326,7 @@ pub(crate) struct Fill<'a, C, const SIGNED: bool> {
     pub(crate) cells: &'a mut [C],
 }
 
-impl<const SIGNED: bool> Fill<'_, F64x8, SIGNED> {
+impl<const ROWS: u8> Fill<'_, F64x8, ROWS> {
     /// Compiled here once: a generic caller would otherwise be compiled with all of it in every crate.
     #[inline(never)]
     pub(crate) fn over_eight(mut self) {
@@ -310,10 +334,10 @@ impl<const SIGNED: bool> Fill<'_, F64x8, SIGNED> {
     }
 }
 
-impl<C: Copy, const SIGNED: bool> Kernel<C> for Fill<'_, C, SIGNED> {
+impl<C: Copy, const ROWS: u8> Kernel<C> for Fill<'_, C, ROWS> {
     #[inline(always)]
     fn run<T: Lane<Cell = C>>(&mut self, at: T::At) {
-        fill::<T, SIGNED>(
+        fill::<T, ROWS>(
             at,
             self.model,
             self.rows,

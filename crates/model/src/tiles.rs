@@ -5,6 +5,7 @@ use crate::model::Model;
 use crate::packing::{Packing, ROOM, Target};
 use crate::parameter::Columns;
 use crate::plan::Plan;
+use crate::projection::TILES;
 use crate::regressor::Fill;
 use crate::states::{JointStates, LaneStates, eight};
 use crate::wide::F64x8;
@@ -106,7 +107,7 @@ impl RegressorTiles {
         for block in 0..self.n_blocks {
             self.go_to(block);
             self.lanes.load(states, first + block * LANES);
-            let fill = Fill::<_, false> {
+            let fill = Fill::<_, TILES> {
                 model,
                 rows: Target {
                     plan: &self.plan,
