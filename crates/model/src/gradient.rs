@@ -111,24 +111,24 @@ pub fn regressor_contraction_gradient(
     over_lanes(model, states, |first, lanes, work| {
         y.move_to(first, states.n_samples());
         g.move_to(first, states.n_samples());
-        let fill = Fill::<_, BLOCKS> {
+        Fill::<_, BLOCKS> {
             model,
             rows: rows.all(),
             state: lanes.state(),
             kinematics: &mut kinematics,
             cells: y.entries_mut(),
-        };
-        fill.over_eight();
+        }
+        .over_eight();
         weigh(&y, &mut g);
-        let contraction = RegressorContraction {
+        RegressorContraction {
             model,
             plan: &rows.plan,
             state: lanes.state(),
             kinematics: &kinematics,
             weights: g.entries(),
             work,
-        };
-        contraction.over_eight();
+        }
+        .over_eight();
     })
 }
 
@@ -471,13 +471,12 @@ impl<C: Copy> RegressorContraction<'_, C> {
     fn drives<T: Lane<Cell = C>>(&mut self, at: T::At, j: usize) {
         for &(kind, column) in &self.plan.drives[j] {
             let weight = T::read(at, &self.weights[j * self.plan.n_columns + column]);
-            let mut out = JointBar::<T>::read(at, &self.work.out[j]);
-            match kind {
-                ParameterKind::Ia => out.qdd = out.qdd + weight,
-                ParameterKind::Fv => out.qd = out.qd + weight,
-                _ => {}
-            }
-            out.write(at, &mut self.work.out[j]);
+            let sum = match kind {
+                ParameterKind::Ia => &mut self.work.out[j].qdd,
+                ParameterKind::Fv => &mut self.work.out[j].qd,
+                _ => continue,
+            };
+            (T::read(at, sum) + weight).write(at, sum);
         }
     }
 
