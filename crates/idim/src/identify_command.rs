@@ -164,7 +164,10 @@ fn run_logs(args: &IdentifyArgs, robot: &Path, out: &mut dyn Write) -> Result<()
     let [logs, validate] = args.reading.cut([&args.log, &args.validate])?;
     let waivers = args.reading.waivers(&loaded.robot)?;
     let training = read_logs(&logs, &loaded, &mapping, waivers)?;
-    let validation = read_logs(&validate, &loaded, &mapping, waivers)?;
+    let mut validation = read_logs(&validate, &loaded, &mapping, waivers)?;
+    // Nothing is estimated from these.
+    let findings = &mut validation.findings;
+    findings.retain(|f| f.finding.code != "few-samples");
     let seen = training.prints();
     refuse_shared(&validation.prints(), &seen, "--log", PROVED_ON_ITSELF)?;
     progress.stage("identifying");

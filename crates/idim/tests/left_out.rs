@@ -222,4 +222,16 @@ fn identity_few_independent_samples_are_told() {
     assert!(said.contains("few-samples"), "{said}");
     let long = Bench::new(&whole).run("check", &[]).unwrap();
     assert!(!long.contains("few-samples"), "{long}");
+    // A log to prove a model on may be short: nothing is estimated from it.
+    let bench = Bench::new(&whole);
+    let log = bench.dir.path().join("log.csv").display().to_string();
+    let ask = |learn: &str, prove: &str| {
+        let [learn, prove] = [learn, prove].map(|range| format!("{log}@{range}"));
+        let [robot, out] = ["arm.ron", "out"].map(|f| bench.dir.path().join(f));
+        let [robot, out] = [robot.to_str().unwrap(), out.to_str().unwrap()];
+        let files = ["identify", "--robot", robot, "--out", out];
+        run(&[&files[..], &["--log", &learn, "--validate", &prove]].concat()).unwrap()
+    };
+    assert!(ask("0..200", "200..2000").contains("few-samples"));
+    assert!(!ask("200..2000", "0..200").contains("few-samples"));
 }
