@@ -1,23 +1,11 @@
 //! Parts of logs left out, torques that saturate, drift or come late, as a user meets them.
 #![allow(clippy::unwrap_used)]
 
-use clap::Parser;
+mod command;
+
+use command::run;
 use serde_json::Value;
 use std::fmt::Write as _;
-
-#[derive(Parser)]
-struct Arguments {
-    #[command(subcommand)]
-    command: idim::cli::Command,
-}
-
-fn run(arguments: &[&str]) -> Result<String, String> {
-    let all = ["idim"].iter().chain(arguments);
-    let parsed = Arguments::try_parse_from(all).map_err(|e| e.to_string())?;
-    let mut out = Vec::new();
-    idim::cli::run(&parsed.command, &mut out).map_err(|e| e.to_string())?;
-    Ok(String::from_utf8(out).unwrap())
-}
 
 /// Viscous friction of both joints, N·m·s/rad.
 const VISCOUS: f64 = 3.0;

@@ -1,7 +1,9 @@
 //! Loads, drive gains and torque constants, from simulated recordings whose truth is known.
 #![allow(clippy::unwrap_used)]
 
-use clap::Parser;
+mod command;
+
+use command::run;
 use idim_model::{InertialParameters, Joint, Link, Robot, robot_from_ron, robot_to_ron};
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
@@ -10,20 +12,6 @@ use rand_distr::{Distribution, StandardNormal};
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-
-#[derive(Parser)]
-struct Arguments {
-    #[command(subcommand)]
-    command: idim::cli::Command,
-}
-
-fn run(arguments: &[&str]) -> Result<String, String> {
-    let all = ["idim"].iter().chain(arguments);
-    let parsed = Arguments::try_parse_from(all).map_err(|e| e.to_string())?;
-    let mut out = Vec::new();
-    idim::cli::run(&parsed.command, &mut out).map_err(|e| e.to_string())?;
-    Ok(String::from_utf8(out).unwrap())
-}
 
 fn json(arguments: &[&str]) -> Value {
     serde_json::from_str(&run(arguments).unwrap()).unwrap()

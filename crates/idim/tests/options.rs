@@ -1,21 +1,9 @@
 //! Options that leave each other nothing to do are refused by name, never dropped.
 #![allow(clippy::unwrap_used)]
 
-use clap::Parser;
+mod command;
 
-#[derive(Parser)]
-struct Arguments {
-    #[command(subcommand)]
-    command: idim::cli::Command,
-}
-
-fn run(arguments: &[&str]) -> Result<String, String> {
-    let all = ["idim"].iter().chain(arguments);
-    let parsed = Arguments::try_parse_from(all).map_err(|e| e.to_string())?;
-    let mut out = Vec::new();
-    idim::cli::run(&parsed.command, &mut out).map_err(|e| e.to_string())?;
-    Ok(String::from_utf8(out).unwrap())
-}
+use command::run;
 
 /// Refused with each of these words, whatever the log: options are read before it.
 #[track_caller]

@@ -1,22 +1,10 @@
 //! What a run leaves in its folder of results, and what it must not touch.
 #![allow(clippy::unwrap_used)]
 
-use clap::Parser;
+mod command;
+
+use command::run;
 use std::path::{Path, PathBuf};
-
-#[derive(Parser)]
-struct Arguments {
-    #[command(subcommand)]
-    command: idim::cli::Command,
-}
-
-fn run(arguments: &[&str]) -> Result<String, String> {
-    let all = ["idim"].iter().chain(arguments);
-    let parsed = Arguments::try_parse_from(all).map_err(|e| e.to_string())?;
-    let mut out = Vec::new();
-    idim::cli::run(&parsed.command, &mut out).map_err(|e| e.to_string())?;
-    Ok(String::from_utf8(out).unwrap())
-}
 
 /// A folder with a PUMA's first three joints and a log of it.
 struct Bench {

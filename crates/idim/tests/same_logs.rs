@@ -1,23 +1,11 @@
 //! A recording under another name is the same recording, and nothing is written over what was read.
 #![allow(clippy::unwrap_used)]
 
-use clap::Parser;
+mod command;
+
+use command::run;
 use std::fmt::Write as _;
 use std::path::Path;
-
-#[derive(Parser)]
-struct Arguments {
-    #[command(subcommand)]
-    command: idim::cli::Command,
-}
-
-fn run(arguments: &[&str]) -> Result<String, String> {
-    let all = ["idim"].iter().chain(arguments);
-    let parsed = Arguments::try_parse_from(all).map_err(|e| e.to_string())?;
-    let mut out = Vec::new();
-    idim::cli::run(&parsed.command, &mut out).map_err(|e| e.to_string())?;
-    Ok(String::from_utf8(out).unwrap())
-}
 
 /// A motion and the torques of an arm that is nothing but rotor inertia and friction; `t0` s into it.
 fn csv(t0: f64, separator: char) -> String {
