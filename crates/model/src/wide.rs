@@ -262,7 +262,7 @@ pub(crate) fn over_eight(kernel: &mut impl Kernel<F64x8>) {
 pub(crate) fn over_eight_on(arch: Arch, kernel: &mut impl Kernel<F64x8>) {
     match arch {
         #[cfg(target_arch = "x86_64")]
-        Arch::V4(simd) => Simd::vectorize(*simd, Eight(kernel)),
+        Arch::V4(simd) => Simd::vectorize(simd, Eight(kernel)),
         #[cfg(target_arch = "x86_64")]
         Arch::V3(simd) => Simd::vectorize(simd, EightByTwo(kernel)),
         #[cfg(target_arch = "x86_64")]
@@ -276,7 +276,7 @@ pub(crate) fn over_eight_on(arch: Arch, kernel: &mut impl Kernel<F64x8>) {
 #[inline]
 pub(crate) fn over_one(kernel: &mut impl Kernel<f64>) {
     match Arch::new() {
-        // One sample has no use for wider registers.
+        // One sample has no use for wider registers; with the star it runs on V3.
         #[cfg(target_arch = "x86_64")]
         Arch::V4(simd) => Simd::vectorize(*simd, One(kernel)),
         #[cfg(target_arch = "x86_64")]
@@ -358,6 +358,26 @@ mod tests {
                 x.sign().write(at, sign);
                 s.mul_add(x, -c).write(at, fused);
             }
+        }
+    }
+
+    /// Registers the decisions are repeated for.
+    struct Repeats(usize);
+
+    impl Kernel<F64x8> for Repeats {
+        #[inline(always)]
+        fn run<T: Lane<Cell = F64x8>>(&mut self, _: T::At) {
+            self.0 = T::PARTS;
+        }
+    }
+
+    #[test]
+    fn kernels_over_eight_run_once_wherever_two_registers_or_one_hold_them() {
+        for arch in architectures() {
+            let mut repeats = Repeats(0);
+            over_eight_on(arch, &mut repeats);
+            let expected = if matches!(arch, Arch::Scalar) { 8 } else { 1 };
+            assert_eq!(repeats.0, expected, "{arch:?}");
         }
     }
 
