@@ -6,6 +6,8 @@ anchors=$(realpath "${1:?folder made by setup.sh of the anchors}")
 core=${2:-1}
 cd "$(dirname "$0")/.."
 build=$anchors/build
+# Where these are set the anchors' scripts start themselves anew, and lose what they were to read from the pipe.
+unset OPENBLAS_CORETYPE OPENBLAS_L2_SIZE
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cargo build --quiet --release --package idim-benches --bin side_by_side

@@ -2,8 +2,8 @@
 //!
 //! Decisions are taken once for all registers of a cell; what is between two decisions goes from memory to memory.
 
-use crate::frame::{LinkPose, Rotation, shift_where};
-use crate::kinematics::{LinkMotion, Screw, Travel, zero_motion};
+use crate::frame::{Fixed, Rotation, shift_where};
+use crate::kinematics::{LinkMotion, Screw, Travel};
 use crate::lane::{Lane, V3, minus, read, splat, times, write, zero};
 use crate::model::{Direction, KernelJoint, Model};
 use crate::robot::JointKind;
@@ -12,56 +12,38 @@ use crate::wrench_map::WrenchMap;
 /// Motions and axes of one sample or eight.
 #[derive(Debug, Clone)]
 pub(crate) struct Kinematics<C> {
-    pub(crate) n: usize,
     /// Sine and cosine, or travel, of every joint.
     travel: Vec<[C; 2]>,
-    /// Motion of every link; its acceleration only where the link's frame stands apart from its joint's.
-    pub(crate) motion: Vec<LinkMotion<C>>,
-    /// Acceleration of every joint's origin, in the axes of the link below.
-    origin: Vec<V3<C>>,
-    /// The map of the link whose turn it is.
+    pub(crate) links: Vec<LinkAxes<C>>,
+    /// The map of a link at its own frame, where that stands apart from its joint's.
+    pub(crate) posed: WrenchMap<C>,
+}
+
+/// What is known of a link at its joint's frame, in the axes of that frame.
+#[derive(Debug, Clone)]
+pub(crate) struct LinkAxes<C> {
+    /// Angular velocity, rad/s.
+    pub(crate) w: V3<C>,
     pub(crate) map: WrenchMap<C>,
-    /// At `link * n + d`: direction `d` of the link's path; the last one is z and stays.
+    /// Directions of the axes on the link's path; the last one is z and stays.
     pub(crate) direction: Vec<V3<C>>,
-    /// At `link * n + k`: speed of the link's origin per unit speed of the `k`-th joint on its path, if it turns; zero for
-    /// the link's own.
+    /// Speed of the link's origin per unit speed of each joint on its path, if that turns; zero for the link's own.
     pub(crate) linear: Vec<V3<C>>,
 }
 
 impl<C: Copy> Kinematics<C> {
     /// `zero` and `one` in every sample.
     pub(crate) fn new(model: &Model, [zero, one]: [C; 2]) -> Self {
-        let n = model.n_joints();
-        Self {
-            n,
-            travel: vec![[zero; 2]; n],
-            motion: vec![zero_motion(zero); n],
-            origin: vec![[zero; 3]; n],
+        let of_link = |joint: &KernelJoint| LinkAxes {
+            w: [zero; 3],
             map: WrenchMap::cells(zero),
-            direction: vec![[zero, zero, one]; n * n],
-            linear: vec![[zero; 3]; n * n],
-        }
-    }
-
-    /// Axis of the `k`-th joint on the path of link `j`, of direction `d`, at the frame of the link.
-    #[inline(always)]
-    pub(crate) fn axis<T: Lane<Cell = C>>(
-        &self,
-        at: T::At,
-        j: usize,
-        d: &Direction,
-        k: usize,
-    ) -> Screw<T> {
-        let direction = read(at, &self.direction[j * self.n + d.index]);
-        match d.kind {
-            JointKind::Revolute => Screw {
-                angular: direction,
-                linear: read(at, &self.linear[j * self.n + k]),
-            },
-            JointKind::Prismatic => Screw {
-                angular: zero(at),
-                linear: direction,
-            },
+            direction: vec![[zero, zero, one]; joint.directions.len()],
+            linear: vec![[zero; 3]; joint.path.len()],
+        };
+        Self {
+            travel: vec![[zero; 2]; model.n_joints()],
+            links: model.joints.iter().map(of_link).collect(),
+            posed: WrenchMap::cells(zero),
         }
     }
 
@@ -85,156 +67,193 @@ impl<C: Copy> Kinematics<C> {
         j: usize,
         [qd, qdd]: [&C; 2],
     ) {
-        // The same lines for every step, compiled once for each simple one.
         let joint = &model.joints[j];
+        let travel = &self.travel[j];
+        let (before, rest) = self.links.split_at_mut(j);
+        let Some(here) = rest.first_mut() else { return };
+        let below = joint.parent.map(|p| (&model.joints[p], &before[p]));
+        // The same lines for every step, compiled once for each simple one.
         for part in 0..T::PARTS {
             let at = T::part(at, part);
             let speeds = [T::read(at, qd), T::read(at, qdd)];
-            let travel = Travel::read(at, joint.kind, &self.travel[j]);
+            let travel = Travel::read(at, joint.kind, travel);
+            let Some((parent, below)) = below else {
+                here.start(at, model.gravity, joint, travel, speeds);
+                continue;
+            };
+            let link = Outward {
+                joint,
+                parent,
+                below,
+            };
             match (joint.step.rotation, travel) {
                 (Rotation::Quarter, Travel::Turn { s, c }) => {
                     let step = (Rotation::Quarter, Travel::Turn { s, c });
-                    self.carry_axes(at, model, j, step);
-                    self.move_link(at, model, j, step, speeds);
+                    link.carry_axes(at, step, here);
+                    link.move_link(at, step, speeds, here);
                 }
                 (Rotation::None, Travel::Turn { s, c }) => {
                     let step = (Rotation::None, Travel::Turn { s, c });
-                    self.carry_axes(at, model, j, step);
-                    self.move_link(at, model, j, step, speeds);
+                    link.carry_axes(at, step, here);
+                    link.move_link(at, step, speeds, here);
                 }
                 step => {
-                    self.carry_axes(at, model, j, step);
-                    self.move_link(at, model, j, step, speeds);
+                    link.carry_axes(at, step, here);
+                    link.move_link(at, step, speeds, here);
                 }
             }
         }
     }
+}
 
-    /// Motion of link `j` about its joint's frame, from that of the link below.
+impl<C: Copy> LinkAxes<C> {
+    /// Axis of the `k`-th joint on the link's path, of direction `d`, at the frame of its joint.
+    #[inline(always)]
+    pub(crate) fn axis<T: Lane<Cell = C>>(&self, at: T::At, d: &Direction, k: usize) -> Screw<T> {
+        let direction = read(at, &self.direction[d.index]);
+        match d.kind {
+            JointKind::Revolute => Screw {
+                angular: direction,
+                linear: read(at, &self.linear[k]),
+            },
+            JointKind::Prismatic => Screw {
+                angular: zero(at),
+                linear: direction,
+            },
+        }
+    }
+
+    /// Motion of a link on the base.
+    #[inline(always)]
+    fn start<T: Lane<Cell = C>>(
+        &mut self,
+        at: T::At,
+        gravity: [f64; 3],
+        joint: &KernelJoint,
+        travel: Travel<T>,
+        [qd, qdd]: [T; 2],
+    ) {
+        let up = joint.step.rotation.inward(minus(gravity));
+        let a = splat(at, up);
+        let vertical = up[0] == 0.0 && up[1] == 0.0;
+        let carried = LinkMotion {
+            w: zero(at),
+            wd: zero(at),
+            a: if vertical { a } else { travel.inward(a) },
+        };
+        let motion = carried.moved(travel, qd, qdd);
+        self.put(at, &motion, &WrenchMap::planar(&motion));
+    }
+
+    /// Puts down what is known of the link.
+    #[inline(always)]
+    fn put<T: Lane<Cell = C>>(&mut self, at: T::At, motion: &LinkMotion<T>, map: &WrenchMap<T>) {
+        write(at, motion.w, &mut self.w);
+        map.write(at, &mut self.map);
+    }
+}
+
+/// A joint, the one it stands on, and what is known of the link between.
+struct Outward<'a, C> {
+    joint: &'a KernelJoint,
+    parent: &'a KernelJoint,
+    below: &'a LinkAxes<C>,
+}
+
+impl<C: Copy> Outward<'_, C> {
+    /// Motion of the link about its joint's frame.
     #[inline(always)]
     fn move_link<T: Lane<Cell = C>>(
-        &mut self,
+        &self,
         at: T::At,
-        model: &Model,
-        j: usize,
         step: (Rotation, Travel<T>),
-        speeds: [T; 2],
+        [qd, qdd]: [T; 2],
+        here: &mut LinkAxes<C>,
     ) {
-        let joint = &model.joints[j];
-        let below = joint.parent.map(|p| (p, &model.joints[p]));
+        let Fixed {
+            reaches,
+            translation,
+            ..
+        } = self.joint.step;
+        let below = self.below;
+        let origin = below.map.acceleration_where(at, reaches, translation);
         // Each arm goes through to the end: where they met, all of a motion would have to be put down.
-        match below {
-            None => {
-                let up = joint.step.rotation.inward(minus(model.gravity));
-                let a = splat(at, up);
-                let vertical = up[0] == 0.0 && up[1] == 0.0;
-                let carried = LinkMotion {
-                    w: zero(at),
-                    wd: zero(at),
-                    a: if vertical { a } else { step.1.inward(a) },
-                };
-                let motion = carried.moved(step.1, speeds[0], speeds[1]);
-                self.put_map(at, model, j, &motion, WrenchMap::planar(&motion));
+        if self.parent.planar {
+            let z = z_beyond(at, step);
+            let carried = LinkMotion {
+                w: times(T::read(at, &below.w[2]), z),
+                wd: times(T::read(at, &below.map.wd[2]), z),
+                a: into_joint(step, origin),
+            };
+            let motion = carried.moved(step.1, qd, qdd);
+            if self.joint.planar {
+                here.put(at, &motion, &WrenchMap::planar(&motion));
+            } else {
+                here.put(at, &motion, &WrenchMap::new(&motion));
             }
-            Some((p, KernelJoint { planar: true, .. })) => {
-                let z = z_beyond(at, step);
-                let below = &self.motion[p];
-                let carried = LinkMotion {
-                    w: times(T::read(at, &below.w[2]), z),
-                    wd: times(T::read(at, &below.wd[2]), z),
-                    a: into_joint(step, read(at, &self.origin[j])),
-                };
-                let motion = carried.moved(step.1, speeds[0], speeds[1]);
-                if joint.planar {
-                    self.put_map(at, model, j, &motion, WrenchMap::planar(&motion));
-                } else {
-                    self.put_map(at, model, j, &motion, WrenchMap::new(&motion));
-                }
-            }
-            Some((p, _)) => {
-                let below = &self.motion[p];
-                let carried = LinkMotion {
-                    w: into_joint(step, read(at, &below.w)),
-                    wd: into_joint(step, read(at, &below.wd)),
-                    a: into_joint(step, read(at, &self.origin[j])),
-                };
-                let motion = carried.moved(step.1, speeds[0], speeds[1]);
-                self.put_map(at, model, j, &motion, WrenchMap::new(&motion));
-            }
+        } else {
+            let carried = LinkMotion {
+                w: into_joint(step, read(at, &below.w)),
+                wd: into_joint(step, read(at, &below.map.wd)),
+                a: into_joint(step, origin),
+            };
+            let motion = carried.moved(step.1, qd, qdd);
+            here.put(at, &motion, &WrenchMap::new(&motion));
         }
     }
 
-    /// Puts down what is known of link `j`, and what it does at the joints it carries.
-    #[inline(always)]
-    fn put_map<T: Lane<Cell = C>>(
-        &mut self,
-        at: T::At,
-        model: &Model,
-        j: usize,
-        motion: &LinkMotion<T>,
-        map: WrenchMap<T>,
-    ) {
-        map.write(at, &mut self.map);
-        let known = &mut self.motion[j];
-        write(at, motion.w, &mut known.w);
-        write(at, motion.wd, &mut known.wd);
-        if let LinkPose::Posed { .. } = model.joints[j].link {
-            write(at, motion.a, &mut known.a);
-        }
-        for &c in &model.joints[j].children {
-            let step = &model.joints[c].step;
-            let a = map.acceleration_at(step.translation);
-            write(at, a, &mut self.origin[c]);
-        }
-    }
-
-    /// Carries the axes of the link below out to link `j`.
+    /// Carries the axes of the link below out to the link.
     #[inline(always)]
     fn carry_axes<T: Lane<Cell = C>>(
-        &mut self,
+        &self,
         at: T::At,
-        model: &Model,
-        j: usize,
         step: (Rotation, Travel<T>),
+        here: &mut LinkAxes<C>,
     ) {
-        let joint = &model.joints[j];
-        let Some(p) = joint.parent else { return };
-        let Some((own, others)) = model.joints[p].directions.split_last() else {
+        let Some((own, others)) = self.parent.directions.split_last() else {
             return;
         };
-        let (from, to) = (p * self.n, j * self.n);
-        let (reaches, reach) = (joint.step.reaches, joint.step.translation);
+        let reach = self.joint.step.translation;
+        // Side by side, not by index: where each of them ends is all there is to check.
+        let mut from = self.below.linear.iter();
+        let mut to = here.linear.iter_mut();
+        let mut turned = here.direction.iter_mut();
+        let mut straight = self.below.direction.iter();
         for d in others {
-            let outside = read(at, &self.direction[from + d.index]);
+            let (Some(outside), Some(turned)) = (straight.next(), turned.next()) else {
+                return;
+            };
+            let outside = read(at, outside);
             let direction = into_joint(step, outside);
-            write(at, direction, &mut self.direction[to + d.index]);
-            if d.kind == JointKind::Prismatic {
-                continue;
-            }
-            for k in d.range.start..d.range.end {
-                let inside = read(at, &self.linear[from + k]);
-                let shifted = shift_where(reaches, reach, inside, outside);
-                let linear = carried_speed(step, direction, shifted);
-                write(at, linear, &mut self.linear[to + k]);
+            write(at, direction, turned);
+            for _ in d.range.start..d.range.end {
+                let (Some(from), Some(to)) = (from.next(), to.next()) else {
+                    return;
+                };
+                if d.kind == JointKind::Prismatic {
+                    continue;
+                }
+                let inside = read(at, from);
+                let shifted = shift_where(self.joint.step.reaches, reach, inside, outside);
+                write(at, carried_speed(step, direction, shifted), to);
             }
         }
         // The axis of the joint below itself is z there, and stays z where the two are parallel.
-        let stays = joint.directions.len() == others.len() + 1;
-        let direction = if stays {
+        let direction = if self.joint.directions.len() == others.len() + 1 {
             z_axis(at)
         } else {
-            z_beyond(at, step)
+            let direction = z_beyond(at, step);
+            let Some(turned) = turned.next() else { return };
+            write(at, direction, turned);
+            direction
         };
-        if !stays {
-            write(at, direction, &mut self.direction[to + own.index]);
-        }
         if own.kind == JointKind::Prismatic {
             return;
         }
-        for k in own.range.start..own.range.end {
-            let shifted = shift_about_z(reach, read(at, &self.linear[from + k]));
-            let linear = carried_speed(step, direction, shifted);
-            write(at, linear, &mut self.linear[to + k]);
+        // The link's own joint has no speed there.
+        while let (Some(from), Some(to)) = (from.next(), to.next()) {
+            let shifted = shift_about_z(reach, read(at, from));
+            write(at, carried_speed(step, direction, shifted), to);
         }
     }
 }

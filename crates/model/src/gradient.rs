@@ -439,7 +439,7 @@ impl<C: Copy> RegressorContraction<'_, C> {
             for k in d.range.clone() {
                 let i = joint.path[k];
                 let ten = self.weights_of(at, j, i);
-                let axis = self.kinematics.axis::<T>(at, j, d, k);
+                let axis = self.kinematics.links[j].axis::<T>(at, d, k);
                 let axis = match &joint.link {
                     LinkPose::Along(_) => axis,
                     LinkPose::Posed {

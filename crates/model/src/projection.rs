@@ -5,7 +5,7 @@
 //! entries of the inertia tensor; the link's own axis is z, and the one before it most often has no part along z.
 //! Decisions are taken once for all registers of a cell.
 
-use crate::axes::Kinematics;
+use crate::axes::{Kinematics, LinkAxes};
 use crate::frame::LinkPose;
 use crate::kinematics::LinkMotion;
 use crate::lane::{Lane, V3, read, zero};
@@ -15,7 +15,7 @@ use crate::parameter::ParameterKind;
 use crate::plan::{ALL, ASK, BASE_XX, BASE_YY, LinkPlan};
 use crate::robot::JointKind;
 use crate::wrench_map::{ABOUT_Z, ACROSS, ANY, SLIDE, WrenchMap};
-use std::ops::Range;
+use std::slice::Iter;
 
 /// Rows of tiles: packed, without the columns' signs.
 pub(crate) const TILES: u8 = 0;
@@ -34,21 +34,20 @@ pub(crate) fn fill<T: Lane, const ROWS: u8>(
     kinematics: &mut Kinematics<T::Cell>,
     cells: &mut [T::Cell],
 ) {
-    let n = kinematics.n;
+    let n = model.n_joints();
     kinematics.turn_joints::<T>(at, model, q);
     for (j, joint) in model.joints.iter().enumerate() {
         kinematics.go_out::<T>(at, model, j, [&qd[j], &qdd[j]]);
         let link = &target.plan.links[j];
         if !link.is_empty() {
-            let rows = &target.links[j * n..][..joint.path.len()];
             let of = OfLink {
-                j,
                 joint,
                 link,
-                rows,
+                rows: &target.links[j * n..][..joint.path.len()],
                 n_columns: target.plan.n_columns,
             };
-            of.project::<T, ROWS>(at, kinematics, cells);
+            let (axes, posed) = (&kinematics.links[j], &mut kinematics.posed);
+            of.project::<T, ROWS>(at, axes, posed, cells);
         }
         for (d, &(kind, column)) in target.plan.drives[j].iter().enumerate() {
             let place = if ROWS == DENSE { column } else { d };
@@ -69,7 +68,6 @@ pub(crate) fn fill<T: Lane, const ROWS: u8>(
 
 /// The entries of a link.
 struct OfLink<'a> {
-    j: usize,
     joint: &'a KernelJoint,
     link: &'a LinkPlan,
     /// Its first cell in the row of every joint on its path.
@@ -83,7 +81,8 @@ impl OfLink<'_> {
     fn project<T: Lane, const ROWS: u8>(
         &self,
         at: T::At,
-        kinematics: &mut Kinematics<T::Cell>,
+        axes: &LinkAxes<T::Cell>,
+        posed: &mut WrenchMap<T::Cell>,
         cells: &mut [T::Cell],
     ) {
         if let LinkPose::Posed {
@@ -92,13 +91,14 @@ impl OfLink<'_> {
             ..
         } = &self.joint.link
         {
-            return self.project_posed::<T, ROWS>(at, (rotation, *translation), kinematics, cells);
+            let pose = (rotation, *translation);
+            return self.project_posed::<T, ROWS>(at, pose, axes, posed, cells);
         }
         match self.link.wanted {
-            BASE_XX => self.project_along::<T, BASE_XX, ROWS>(at, kinematics, cells),
-            BASE_YY => self.project_along::<T, BASE_YY, ROWS>(at, kinematics, cells),
-            ALL => self.project_along::<T, ALL, ROWS>(at, kinematics, cells),
-            _ => self.project_along::<T, ASK, ROWS>(at, kinematics, cells),
+            BASE_XX => self.project_along::<T, BASE_XX, ROWS>(at, axes, cells),
+            BASE_YY => self.project_along::<T, BASE_YY, ROWS>(at, axes, cells),
+            ALL => self.project_along::<T, ALL, ROWS>(at, axes, cells),
+            _ => self.project_along::<T, ASK, ROWS>(at, axes, cells),
         }
     }
 
@@ -107,46 +107,60 @@ impl OfLink<'_> {
     fn project_along<T: Lane, const WANTED: u16, const ROWS: u8>(
         &self,
         at: T::At,
-        kinematics: &Kinematics<T::Cell>,
+        axes: &LinkAxes<T::Cell>,
         cells: &mut [T::Cell],
     ) {
-        let first = self.j * kinematics.n;
-        let map = &kinematics.map;
-        let Some((own, others)) = self.joint.directions.split_last() else {
+        let map = &axes.map;
+        let (Some((own, others)), Some((&last, rows))) =
+            (self.joint.directions.split_last(), self.rows.split_last())
+        else {
             return;
         };
-        for d in others {
-            let axes = d.range.start..d.range.end;
+        // Side by side, not by index: where they end is all there is to check.
+        let mut rows = rows.iter();
+        let mut linear = axes.linear.iter();
+        for (d, v) in others.iter().zip(&axes.direction) {
+            let n = d.range.end - d.range.start;
             match (d.kind, d.across) {
                 (JointKind::Prismatic, _) => {
-                    let v = &kinematics.direction[first + d.index];
-                    self.project_slide::<T, WANTED, ROWS>(at, axes, v, map, cells);
+                    for _ in 0..n {
+                        let (Some(&row), Some(_)) = (rows.next(), linear.next()) else {
+                            return;
+                        };
+                        self.project_slide::<T, WANTED, ROWS>(at, row, v, map, cells);
+                    }
                 }
-                (_, true) => self.project_direction::<T, ACROSS, WANTED, ROWS>(
-                    at,
-                    (d.index, axes),
-                    kinematics,
-                    cells,
-                ),
-                _ => self.project_direction::<T, ANY, WANTED, ROWS>(
-                    at,
-                    (d.index, axes),
-                    kinematics,
-                    cells,
-                ),
+                (_, true) => {
+                    self.project_direction::<T, ACROSS, WANTED, ROWS>(
+                        at,
+                        n,
+                        (&mut rows, &mut linear),
+                        v,
+                        map,
+                        cells,
+                    );
+                }
+                _ => {
+                    self.project_direction::<T, ANY, WANTED, ROWS>(
+                        at,
+                        n,
+                        (&mut rows, &mut linear),
+                        v,
+                        map,
+                        cells,
+                    );
+                }
             }
         }
-        let v = &kinematics.direction[first + own.index];
-        let (axes, last) = (own.range.start..own.range.end - 1, own.range.end - 1);
+        let Some(v) = axes.direction.last() else {
+            return;
+        };
         if own.kind == JointKind::Prismatic {
-            return self.project_slide::<T, WANTED, ROWS>(at, last..last + 1, v, map, cells);
+            return self.project_slide::<T, WANTED, ROWS>(at, last, v, map, cells);
         }
-        self.project_direction::<T, ABOUT_Z, WANTED, ROWS>(
-            at,
-            (own.index, axes),
-            kinematics,
-            cells,
-        );
+        let n = own.range.end - own.range.start - 1;
+        let path = (&mut rows, &mut linear);
+        self.project_direction::<T, ABOUT_Z, WANTED, ROWS>(at, n, path, v, map, cells);
         let row = self.row::<_, ROWS>(last, cells);
         for part in 0..T::PARTS {
             let at = T::part(at, part);
@@ -158,24 +172,32 @@ impl OfLink<'_> {
         }
     }
 
-    /// Rows of parallel revolute joints: what the tensor's columns say is the same in all of them.
+    /// Rows of the next `n` joints of `path`, revolute and parallel: what the tensor's columns say is the same in all of them.
     #[inline(always)]
     fn project_direction<T: Lane, const FORM: u8, const WANTED: u16, const ROWS: u8>(
         &self,
         at: T::At,
-        (direction, axes): (usize, Range<usize>),
-        kinematics: &Kinematics<T::Cell>,
+        n: usize,
+        (rows, linear): (&mut Iter<'_, usize>, &mut Iter<'_, V3<T::Cell>>),
+        v: &V3<T::Cell>,
+        map: &WrenchMap<T::Cell>,
         cells: &mut [T::Cell],
     ) {
-        let first = self.j * kinematics.n;
-        let map = &kinematics.map;
+        if n == 0 {
+            return;
+        }
+        let start = (rows.as_slice(), linear.as_slice());
         for part in 0..T::PARTS {
             let at = T::part(at, part);
-            let v = read(at, &kinematics.direction[first + direction]);
+            let v = read(at, v);
             let tensor = self.tensor::<T, FORM, WANTED>(at, v, map);
-            for k in axes.start..axes.end {
-                let row = self.row::<_, ROWS>(k, cells);
-                let f = read(at, &kinematics.linear[first + k]);
+            (*rows, *linear) = (start.0.iter(), start.1.iter());
+            for _ in 0..n {
+                let (Some(&row), Some(linear)) = (rows.next(), linear.next()) else {
+                    return;
+                };
+                let row = self.row::<_, ROWS>(row, cells);
+                let f = read(at, linear);
                 self.put_tensor::<T, WANTED, ROWS>(at, row, &tensor);
                 self.put_moments::<T, FORM, WANTED, ROWS>(at, row, (v, f), map);
             }
@@ -266,19 +288,17 @@ impl OfLink<'_> {
     fn project_slide<T: Lane, const WANTED: u16, const ROWS: u8>(
         &self,
         at: T::At,
-        axes: Range<usize>,
+        row: usize,
         v: &V3<T::Cell>,
         map: &WrenchMap<T::Cell>,
         cells: &mut [T::Cell],
     ) {
-        for k in axes {
-            let row = self.row::<_, ROWS>(k, cells);
-            for part in 0..T::PARTS {
-                let at = T::part(at, part);
-                // As if the axis had no angular part.
-                let axis = (zero(at), read(at, v));
-                self.put_moments::<T, SLIDE, WANTED, ROWS>(at, row, axis, map);
-            }
+        let row = self.row::<_, ROWS>(row, cells);
+        for part in 0..T::PARTS {
+            let at = T::part(at, part);
+            // As if the axis had no angular part.
+            let axis = (zero(at), read(at, v));
+            self.put_moments::<T, SLIDE, WANTED, ROWS>(at, row, axis, map);
         }
     }
 
@@ -288,19 +308,24 @@ impl OfLink<'_> {
         &self,
         at: T::At,
         (rotation, translation): (&[[f64; 3]; 3], [f64; 3]),
-        kinematics: &mut Kinematics<T::Cell>,
+        axes: &LinkAxes<T::Cell>,
+        map: &mut WrenchMap<T::Cell>,
         cells: &mut [T::Cell],
     ) {
         for part in 0..T::PARTS {
             let at = T::part(at, part);
-            let own = LinkMotion::<T>::read(at, &kinematics.motion[self.j]);
+            let own = LinkMotion::<T> {
+                w: read(at, &axes.w),
+                wd: read(at, &axes.map.wd),
+                a: read(at, &axes.map.a),
+            };
             let motion = WrenchMap::new(&own).motion_at(&own, rotation, translation);
-            WrenchMap::new(&motion).write(at, &mut kinematics.map);
+            WrenchMap::new(&motion).write(at, map);
             for d in &self.joint.directions {
                 for k in d.range.clone() {
-                    let axis = kinematics.axis::<T>(at, self.j, d, k);
+                    let axis = axes.axis::<T>(at, d, k);
                     let axis = axis.at(rotation, translation);
-                    let (map, row) = (&kinematics.map, self.row::<_, ROWS>(k, cells));
+                    let row = self.row::<_, ROWS>(self.rows[k], cells);
                     let tensor = self.tensor::<T, ANY, ASK>(at, axis.angular, map);
                     self.put_tensor::<T, ASK, ROWS>(at, row, &tensor);
                     let axis = (axis.angular, axis.linear);
@@ -335,10 +360,10 @@ impl OfLink<'_> {
         value.write(at, &mut row[place]);
     }
 
-    /// The cells a link's entries lie in, in the row of the `k`-th joint on its path.
+    /// The cells a link's entries lie in, in a row where the first of them is this one.
     #[inline(always)]
-    fn row<'c, C, const ROWS: u8>(&self, k: usize, cells: &'c mut [C]) -> &'c mut [C] {
-        let cells = &mut cells[self.rows[k]..];
+    fn row<'c, C, const ROWS: u8>(&self, first: usize, cells: &'c mut [C]) -> &'c mut [C] {
+        let cells = &mut cells[first..];
         if ROWS == DENSE {
             return &mut cells[..self.n_columns];
         }

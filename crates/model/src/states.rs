@@ -201,11 +201,32 @@ impl pulp::WithSimd for Load<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        for j in 0..self.states.n_joints() {
-            self.lanes.q[j] = eight(self.states.q(j), self.first);
-            self.lanes.qd[j] = eight(self.states.qd(j), self.first);
-            self.lanes.qdd[j] = eight(self.states.qdd(j), self.first);
+        let Self {
+            lanes,
+            states,
+            first,
+        } = self;
+        load(&mut lanes.q, &states.q, states.n_samples, first);
+        load(&mut lanes.qd, &states.qd, states.n_samples, first);
+        load(&mut lanes.qdd, &states.qdd, states.n_samples, first);
+    }
+}
+
+#[inline(always)]
+fn load(lanes: &mut [F64x8], all: &[f64], n_samples: usize, first: usize) {
+    if first + 8 > n_samples {
+        for (j, lane) in lanes.iter_mut().enumerate() {
+            *lane = eight(&all[j * n_samples..][..n_samples], first);
         }
+        return;
+    }
+    let mut rest = &all[first..];
+    for lane in lanes {
+        let Some(full) = rest.first_chunk::<8>() else {
+            return;
+        };
+        *lane = F64x8(*full);
+        rest = rest.get(n_samples..).unwrap_or_default();
     }
 }
 

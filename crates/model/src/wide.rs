@@ -67,7 +67,8 @@ impl<S: Simd> Neg for Wide<S> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        self.with(self.simd.neg_f64s(self.x))
+        // Not the library's: it is not always inlined.
+        self.flipped(-0.0)
     }
 }
 
@@ -127,8 +128,8 @@ impl<S: Simd> Lane for Wide<S> {
         let cosine_stays = simd.equal_u64s(simd.and_u64s(next, two), none);
         let a = simd.select_f64s(even, sine.x, cosine.x);
         let b = simd.select_f64s(even, cosine.x, sine.x);
-        let s = simd.select_f64s(sine_stays, a, simd.neg_f64s(a));
-        let c = simd.select_f64s(cosine_stays, b, simd.neg_f64s(b));
+        let s = simd.select_f64s(sine_stays, a, self.with(a).flipped(-0.0).x);
+        let c = simd.select_f64s(cosine_stays, b, self.with(b).flipped(-0.0).x);
         let limit = simd.splat_f64s(REDUCTION_LIMIT);
         let small = simd.less_than_or_equal_f64s(simd.abs_f64s(self.x), limit);
         if simd.first_true_m64s(simd.not_m64s(small)) < S::F64_LANES {

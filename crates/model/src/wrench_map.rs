@@ -18,8 +18,9 @@ pub(crate) const SLIDE: u8 = 3;
 /// Entries count as the parameters: the tensor's six, then `MX MY MZ M`. Axis: angular part `v`, linear part `f`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct WrenchMap<T> {
-    wd: V3<T>,
-    /// Acceleration of the frame's origin.
+    /// Angular acceleration, rad/s².
+    pub(crate) wd: V3<T>,
+    /// Acceleration of the frame's origin minus gravity, m/s².
     pub(crate) a: V3<T>,
     /// `[ω̇]× + [ω]×[ω]×`: force per first moment.
     b: [V3<T>; 3],
@@ -137,6 +138,37 @@ impl<C: Copy> WrenchMap<C> {
             z_x: zero,
             y_z: zero,
         }
+    }
+
+    /// Acceleration of a point fixed in the link, where it is known already which of its coordinates are zero.
+    #[inline(always)]
+    pub(crate) fn acceleration_where<T: Lane<Cell = C>>(
+        &self,
+        at: T::At,
+        reaches: [bool; 3],
+        p: [f64; 3],
+    ) -> V3<T> {
+        let mut a = read(at, &self.a);
+        if reaches[0] {
+            a = self.further(at, 0, p[0], a);
+        }
+        if reaches[1] {
+            a = self.further(at, 1, p[1], a);
+        }
+        if reaches[2] {
+            a = self.further(at, 2, p[2], a);
+        }
+        a
+    }
+
+    #[inline(always)]
+    fn further<T: Lane<Cell = C>>(&self, at: T::At, c: usize, p: f64, a: V3<T>) -> V3<T> {
+        let p = T::splat(at, p);
+        [
+            T::read(at, &self.b[0][c]).mul_add(p, a[0]),
+            T::read(at, &self.b[1][c]).mul_add(p, a[1]),
+            T::read(at, &self.b[2][c]).mul_add(p, a[2]),
+        ]
     }
 
     /// Entry `k < 6` of a revolute axis of the given form.
