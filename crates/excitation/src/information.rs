@@ -6,8 +6,8 @@
 use faer::Mat;
 use idim_model::{Columns, F64x8, JointStates, Model, RegressorTiles};
 
-/// Blocks of eight samples folded together: their lanes are summed once, and they stay in the second-level cache.
-const TOGETHER: usize = 32;
+/// Blocks of eight samples folded together: a joint's row of all of them about fits the first-level cache.
+const TOGETHER: usize = 24;
 const TILE: usize = RegressorTiles::TILE;
 const LANES: usize = 8;
 
@@ -71,15 +71,13 @@ fn products_on(
     assert_eq!(joint_weights.len(), n, "one weight a joint");
     let blocks = TOGETHER.min(states.n_samples().div_ceil(LANES));
     let mut tiles = RegressorTiles::new(model, columns, blocks);
-    let mut sum = vec![0.0; tiles.n_keys().pow(2)];
+    let mut fold = Fold::new(&tiles, observed.is_some(), joint_weights);
     let mut first = 0;
     while first < states.n_samples() {
         first += tiles.fill(model, states, observed, first);
-        arch.dispatch(Fold {
+        arch.dispatch(Take {
+            fold: &mut fold,
             tiles: &tiles,
-            observed: observed.is_some(),
-            joint_weights,
-            sum: &mut sum,
         });
     }
     // The observation has the last key and is the last column.
@@ -87,119 +85,176 @@ fn products_on(
     columns.extend(observed.map(|_| (tiles.n_keys() - 1, 1.0)));
     Mat::from_fn(columns.len(), columns.len(), |a, b| {
         let ((a, sign), (b, other)) = (columns[a], columns[b]);
-        sign * other * sum[a.min(b) * tiles.n_keys() + a.max(b)]
+        sign * other * fold.total(a.min(b), a.max(b))
     })
 }
 
-/// The products of all rows of the samples at hand.
+/// Products of the columns, summed.
 struct Fold<'a> {
-    tiles: &'a RegressorTiles,
-    observed: bool,
     joint_weights: &'a [f64],
-    /// At `a * n_keys + b`, keys `a <= b`.
-    sum: &'a mut [f64],
+    /// Each joint's tiles, as far as there is something to fold.
+    tiles: Vec<Vec<Tile>>,
+    /// The sum for the keys `a <= b` stands at `rows[a] + b`.
+    rows: Vec<usize>,
+    /// The lanes stay apart to the end.
+    sum: Vec<F64x8>,
 }
 
-impl pulp::WithSimd for Fold<'_> {
+/// Where the products of a tile's entries go.
+struct Tile {
+    /// `rows` of the entries' keys.
+    rows: [usize; TILE],
+    /// The entries' keys; what only fills the tile up has one of its own, that of no entry.
+    keys: [usize; TILE],
+    consecutive: bool,
+}
+
+impl<'a> Fold<'a> {
+    fn new(tiles: &RegressorTiles, observed: bool, joint_weights: &'a [f64]) -> Self {
+        let none = tiles.n_keys();
+        // A triangle: each row lacks what those before have of it.
+        let rows: Vec<usize> = (0..=none)
+            .map(|key| key * none - key * (key + 1) / 2 + key)
+            .collect();
+        let of_joint = |joint: usize| {
+            let keys = tiles.keys(joint);
+            // The observation is the last entry of a row: without it the last tile may be empty.
+            let entries = keys.len() - usize::from(!observed);
+            let of_tile = |tile: usize| {
+                let keys: [usize; TILE] =
+                    std::array::from_fn(|k| *keys.get(tile * TILE + k).unwrap_or(&none));
+                Tile {
+                    rows: keys.map(|key| rows[key]),
+                    consecutive: keys.is_sorted_by(|a, b| a + 1 == *b),
+                    keys,
+                }
+            };
+            (0..entries.div_ceil(TILE)).map(of_tile).collect()
+        };
+        Self {
+            joint_weights,
+            tiles: (0..joint_weights.len()).map(of_joint).collect(),
+            sum: vec![F64x8([0.0; LANES]); rows[none] + none + 1],
+            rows,
+        }
+    }
+
+    /// The lanes of a product in one order, whatever the registers.
+    fn total(&self, a: usize, b: usize) -> f64 {
+        let [a0, a1, a2, a3, a4, a5, a6, a7] = self.sum[self.rows[a] + b].0;
+        ((a0 + a4) + (a2 + a6)) + ((a1 + a5) + (a3 + a7))
+    }
+}
+
+/// Takes in the products of all rows of the samples at hand.
+struct Take<'f, 'a> {
+    fold: &'f mut Fold<'a>,
+    tiles: &'f RegressorTiles,
+}
+
+impl pulp::WithSimd for Take<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(mut self, simd: S) {
-        for (joint, &weight) in self.joint_weights.iter().enumerate() {
-            let (row, width) = (self.tiles.row(joint), self.tiles.width(joint));
-            // The observation is the last entry of a row: without it the last tile may be empty.
-            let entries = self.tiles.keys(joint).len() - usize::from(!self.observed);
-            for a in 0..entries.div_ceil(TILE) {
-                for b in a..entries.div_ceil(TILE) {
-                    let mut lanes = [[[0.0; LANES]; TILE]; TILE];
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
+        let Fold {
+            joint_weights,
+            tiles,
+            sum,
+            ..
+        } = self.fold;
+        for (joint, (tiles, &weight)) in tiles.iter().zip(*joint_weights).enumerate() {
+            let first = self.tiles.row(joint).start;
+            for (a, left) in tiles.iter().enumerate() {
+                for (b, right) in tiles.iter().enumerate().skip(a) {
+                    let mut pair = Pair {
+                        blocks: self.tiles.blocks(),
+                        stride: self.tiles.stride(),
+                        places: [first + a, first + b],
+                        tiles: [left, right],
+                        weight,
+                        sum,
+                    };
                     for part in 0..LANES / S::F64_LANES {
                         // Sixteen sums, and what enters them, fit 32 registers, not 16. Of a tile with itself only half is
                         // needed.
                         if S::REGISTER_COUNT >= 32 {
-                            products::<S, TILE, TILE>(
-                                simd,
-                                row,
-                                (width, a, b),
-                                (part, 0),
-                                &mut lanes,
-                            );
-                        } else {
-                            if a == b {
-                                products::<S, 2, 2>(
-                                    simd,
-                                    row,
-                                    (width, a, b),
-                                    (part, 0),
-                                    &mut lanes,
-                                );
-                            } else {
-                                products::<S, TILE, 2>(
-                                    simd,
-                                    row,
-                                    (width, a, b),
-                                    (part, 0),
-                                    &mut lanes,
-                                );
-                            }
-                            products::<S, TILE, 2>(simd, row, (width, a, b), (part, 2), &mut lanes);
+                            pair.products::<S, TILE, TILE>(simd, part, 0);
+                            continue;
                         }
+                        if a == b {
+                            pair.products::<S, 2, 2>(simd, part, 0);
+                        } else {
+                            pair.products::<S, TILE, 2>(simd, part, 0);
+                        }
+                        pair.products::<S, TILE, 2>(simd, part, 2);
                     }
-                    self.add((joint, weight), (a, b), &lanes);
                 }
             }
         }
     }
 }
 
-/// Products of the first `A` entries of a tile with `B` of another one's, from entry `from` on, summed over the blocks.
-#[inline(always)]
-fn products<S: pulp::Simd, const A: usize, const B: usize>(
-    simd: S,
-    row: &[[F64x8; TILE]],
-    (width, left, right): (usize, usize, usize),
-    (part, from): (usize, usize),
-    lanes: &mut [[[f64; LANES]; TILE]; TILE],
-) {
-    // Told once, it need not be checked for every block.
-    assert!(left < width && right < width, "no such tile");
-    let mut sums = [[simd.splat_f64s(0.0); B]; A];
-    for tiles in row.chunks_exact(width) {
-        let (a, b) = (&tiles[left], &tiles[right]);
-        let mut y = [simd.splat_f64s(0.0); B];
-        for t in 0..B {
-            y[t] = S::as_simd_f64s(&b[from + t].0).0[part];
-        }
-        for s in 0..A {
-            let x = S::as_simd_f64s(&a[s].0).0[part];
-            for t in 0..B {
-                sums[s][t] = simd.mul_add_f64s(x, y[t], sums[s][t]);
-            }
-        }
-    }
-    for s in 0..A {
-        for t in 0..B {
-            S::as_mut_simd_f64s(&mut lanes[s][from + t]).0[part] = sums[s][t];
-        }
-    }
+/// Two tiles of a joint's row, and where their products go.
+struct Pair<'a> {
+    blocks: &'a [[F64x8; TILE]],
+    stride: usize,
+    places: [usize; 2],
+    tiles: [&'a Tile; 2],
+    weight: f64,
+    sum: &'a mut [F64x8],
 }
 
-impl Fold<'_> {
-    /// Adds the lanes of a tile's products in one order, whatever the registers.
+impl Pair<'_> {
+    /// Products of the first `A` entries of the one with `B` of the other, from entry `from` on.
     #[inline(always)]
-    fn add(
+    fn products<S: pulp::Simd, const A: usize, const B: usize>(
         &mut self,
-        (joint, weight): (usize, f64),
-        (a, b): (usize, usize),
-        lanes: &[[[f64; LANES]; TILE]; TILE],
+        simd: S,
+        part: usize,
+        from: usize,
     ) {
-        let (keys, n) = (self.tiles.keys(joint), self.tiles.n_keys());
-        let of_tile = |tile: usize| &keys[tile * TILE..keys.len().min((tile + 1) * TILE)];
-        for (&key, lanes) in of_tile(a).iter().zip(lanes) {
-            let sums = &mut self.sum[key * n..][..n];
-            for (&other, lanes) in of_tile(b).iter().zip(lanes) {
-                let [a0, a1, a2, a3, a4, a5, a6, a7] = *lanes;
-                let total = ((a0 + a4) + (a2 + a6)) + ((a1 + a5) + (a3 + a7));
-                sums[other] = weight.mul_add(total, sums[other]);
+        let [left, right] = self.places;
+        // Told once, it need not be checked for every block.
+        assert!(
+            left < self.stride && right < self.stride,
+            "no such tile in a block"
+        );
+        let mut sums = [[simd.splat_f64s(0.0); B]; A];
+        for tiles in self.blocks.chunks_exact(self.stride) {
+            let (a, b) = (&tiles[left], &tiles[right]);
+            let mut y = [simd.splat_f64s(0.0); B];
+            for t in 0..B {
+                y[t] = S::as_simd_f64s(&b[from + t].0).0[part];
+            }
+            for s in 0..A {
+                let x = S::as_simd_f64s(&a[s].0).0[part];
+                for t in 0..B {
+                    sums[s][t] = simd.mul_add_f64s(x, y[t], sums[s][t]);
+                }
+            }
+        }
+        let weight = simd.splat_f64s(self.weight);
+        let [left, right] = self.tiles;
+        let diagonal = self.places[0] == self.places[1];
+        for s in 0..A {
+            // Most tiles have consecutive keys: then one check does for all of them.
+            if right.consecutive && !diagonal {
+                let run = &mut self.sum[left.rows[s] + right.keys[0]..][..TILE];
+                for t in 0..B {
+                    let cell = &mut S::as_mut_simd_f64s(&mut run[from + t].0).0[part];
+                    *cell = simd.mul_add_f64s(weight, sums[s][t], *cell);
+                }
+                continue;
+            }
+            for t in 0..B {
+                // Of a tile with itself the products below the diagonal are there already.
+                if diagonal && from + t < s {
+                    continue;
+                }
+                let cell = &mut self.sum[left.rows[s] + right.keys[from + t]];
+                let cell = &mut S::as_mut_simd_f64s(&mut cell.0).0[part];
+                *cell = simd.mul_add_f64s(weight, sums[s][t], *cell);
             }
         }
     }

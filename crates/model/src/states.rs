@@ -222,11 +222,12 @@ fn load(lanes: &mut [F64x8], all: &[f64], n_samples: usize, first: usize) {
     }
     let mut rest = &all[first..];
     for lane in lanes {
-        let Some(full) = rest.first_chunk::<8>() else {
+        let Some((full, next)) = rest.split_first_chunk::<8>() else {
             return;
         };
-        *lane = F64x8(*full);
-        rest = rest.get(n_samples..).unwrap_or_default();
+        // By the slice: an array of its own would go by way of the stack.
+        lane.0.copy_from_slice(full);
+        rest = next.get(n_samples - 8..).unwrap_or_default();
     }
 }
 

@@ -9,14 +9,15 @@ use crate::projection::TILES;
 use crate::regressor::Fill;
 use crate::states::{JointStates, LaneStates, eight};
 use crate::wide::F64x8;
+use std::ops::Range;
 
 /// Samples side by side in a block.
 const LANES: usize = 8;
 
 /// The torque regressor of some hundred samples, without what is always zero, in tiles of four entries.
 ///
-/// A joint's row holds the columns its torque depends on and, last, what was observed of it; the rows of eight samples
-/// follow those of the eight before. Columns that are each other's negative, or stand twice, share an entry: products of
+/// A joint's row holds the columns its torque depends on and, last, what was observed of it; eight samples are a block, and
+/// a block has the rows of all joints. Columns that are each other's negative, or stand twice, share an entry: products of
 /// entries become products of columns by [`Self::columns`].
 #[derive(Debug, Clone)]
 pub struct RegressorTiles {
@@ -24,14 +25,13 @@ pub struct RegressorTiles {
     packing: Packing,
     lanes: LaneStates,
     kinematics: Kinematics<F64x8>,
-    /// First cell of each joint's row: of the first block, and of the one being filled.
+    /// First tile of each joint's row in a block, and one past the last row's.
     first: Vec<usize>,
-    here: Vec<usize>,
-    /// Where the links' and drives' cells of the block being filled begin, as [`Target`] wants them.
+    /// Where the links' and drives' cells begin in a block, as [`Target`] wants them.
     rows: Vec<usize>,
     drives: Vec<usize>,
-    /// Tiles of each joint's row.
-    width: Vec<usize>,
+    /// Tiles of a block.
+    stride: usize,
     /// Blocks of eight samples there is room for, and those filled last.
     capacity: usize,
     n_blocks: usize,
@@ -51,30 +51,31 @@ impl RegressorTiles {
         let n = model.n_joints();
         let plan = Plan::new(model, columns);
         let packing = Packing::new(model, columns, &plan);
-        let width: Vec<usize> = packing
-            .keys
-            .iter()
-            .map(|keys| keys.len().div_ceil(Self::TILE))
-            .collect();
-        let mut first = Vec::with_capacity(n);
-        let mut n_cells = 0;
-        for &tiles in &width {
-            first.push(n_cells);
-            n_cells += tiles * Self::TILE * capacity;
+        let mut first = vec![0];
+        let mut n_tiles = 0;
+        for keys in &packing.keys {
+            n_tiles += keys.len().div_ceil(Self::TILE);
+            first.push(n_tiles);
         }
+        let cell = |joint: usize, entry: usize| first[joint] * Self::TILE + entry;
+        let rows = packing.start.iter();
+        let rows = rows.map(|&(joint, start)| cell(joint, start)).collect();
+        let drives = packing.drives.iter().enumerate();
+        let drives = drives.map(|(i, &start)| cell(i, start)).collect();
+        // An odd number of tiles: the same tile of many blocks is spread over all sets of the cache.
+        let stride = n_tiles | 1;
         Self {
-            rows: vec![0; n * n],
-            drives: vec![0; n],
             plan,
             packing,
             lanes: LaneStates::new(n),
             kinematics: Kinematics::new(model, [F64x8::ZERO, F64x8::ONE]),
-            here: first.clone(),
             first,
-            width,
+            rows,
+            drives,
+            stride,
             capacity,
             n_blocks: 0,
-            cells: vec![F64x8::ZERO; n_cells + ROOM],
+            cells: vec![F64x8::ZERO; stride * Self::TILE * capacity + ROOM],
         }
     }
 
@@ -95,7 +96,7 @@ impl RegressorTiles {
     ) -> usize {
         let (n, n_all) = (model.n_joints(), states.n_samples());
         assert_eq!(
-            (states.n_joints(), self.width.len()),
+            (states.n_joints(), self.drives.len()),
             (n, n),
             "the states or the tiles have another number of joints than the model"
         );
@@ -105,7 +106,7 @@ impl RegressorTiles {
         let n_samples = (n_all - first).min(self.capacity * LANES);
         self.n_blocks = n_samples.div_ceil(LANES);
         for block in 0..self.n_blocks {
-            self.go_to(block);
+            let cells = &mut self.cells[block * self.stride * Self::TILE..];
             self.lanes.load(states, first + block * LANES);
             let fill = Fill::<_, TILES> {
                 model,
@@ -116,48 +117,40 @@ impl RegressorTiles {
                 },
                 state: self.lanes.state(),
                 kinematics: &mut self.kinematics,
-                cells: &mut self.cells,
+                cells,
             };
             fill.over_eight();
-            for (i, here) in self.here.iter().enumerate() {
-                let cell = &mut self.cells[here + self.packing.keys[i].len() - 1];
-                *cell = observed.map_or(F64x8::ZERO, |y| {
+            // The observation is the last entry of a row.
+            for (i, (keys, start)) in self.packing.keys.iter().zip(&self.first).enumerate() {
+                cells[start * Self::TILE + keys.len() - 1] = observed.map_or(F64x8::ZERO, |y| {
                     eight(&y[i * n_all..][..n_all], first + block * LANES)
                 });
             }
         }
         let rest = n_samples % LANES;
         if rest > 0 {
-            for (here, width) in self.here.iter().zip(&self.width) {
-                for cell in &mut self.cells[*here..][..width * Self::TILE] {
-                    cell.0[rest..].fill(0.0);
-                }
+            let block = self.stride * Self::TILE;
+            for cell in &mut self.cells[(self.n_blocks - 1) * block..][..block] {
+                cell.0[rest..].fill(0.0);
             }
         }
         n_samples
     }
 
-    /// Says where the cells of a block are.
-    fn go_to(&mut self, block: usize) {
-        for (i, here) in self.here.iter_mut().enumerate() {
-            *here = self.first[i] + block * self.width[i] * Self::TILE;
-            self.drives[i] = *here + self.packing.drives[i];
-        }
-        for (row, &(joint, start)) in self.rows.iter_mut().zip(&self.packing.start) {
-            *row = self.here[joint] + start;
-        }
+    /// The tiles of the samples filled last, block after block of [`Self::stride`] tiles each.
+    pub fn blocks(&self) -> &[[F64x8; Self::TILE]] {
+        let cells = self.stride * Self::TILE * self.n_blocks;
+        self.cells[..cells].as_chunks().0
     }
 
-    /// Tiles of a joint's row.
-    pub fn width(&self, joint: usize) -> usize {
-        self.width[joint]
+    /// Tiles of a block.
+    pub fn stride(&self) -> usize {
+        self.stride
     }
 
-    /// A joint's row of the samples filled last: [`Self::width`] tiles of the first eight samples, of the next eight, and
-    /// so on.
-    pub fn row(&self, joint: usize) -> &[[F64x8; Self::TILE]] {
-        let cells = self.width[joint] * Self::TILE * self.n_blocks;
-        self.cells[self.first[joint]..][..cells].as_chunks().0
+    /// Where the tiles of a joint's row are in a block.
+    pub fn row(&self, joint: usize) -> Range<usize> {
+        self.first[joint]..self.first[joint + 1]
     }
 
     /// Keys of the entries of a joint's row, rising: each entry of the regressor that can be other than zero has one, the
@@ -207,8 +200,8 @@ mod tests {
                 let taken = tiles.fill(&model, &states, Some(&observed), first);
                 for joint in 0..n {
                     let keys = tiles.keys(joint);
-                    let rows = tiles.row(joint).as_flattened();
-                    for row in rows.chunks_exact(4 * tiles.width(joint)) {
+                    for block in tiles.blocks().chunks_exact(tiles.stride()) {
+                        let row = block[tiles.row(joint)].as_flattened();
                         prop_assert!(row[keys.len()..].iter().all(|c| *c == F64x8::ZERO));
                         for (a, x) in keys.iter().zip(row) {
                             for (b, y) in keys.iter().zip(row) {
