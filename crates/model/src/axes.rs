@@ -25,20 +25,25 @@ pub(crate) struct LinkAxes<C> {
     /// Angular velocity, rad/s.
     pub(crate) w: V3<C>,
     pub(crate) map: WrenchMap<C>,
-    /// Directions of the axes on the link's path; the last one is z and stays.
-    pub(crate) direction: Vec<V3<C>>,
-    /// Speed of the link's origin per unit speed of each joint on its path, if that turns; zero for the link's own.
-    pub(crate) linear: Vec<V3<C>>,
+    /// The axes on the link's path: of each [`Direction`] the direction itself and then, joint by joint, the speed of the
+    /// link's origin per unit speed of the joint, if that turns. The link's own direction is z and stays; the speed of its
+    /// own joint is zero and stays.
+    pub(crate) axes: Vec<V3<C>>,
 }
 
 impl<C: Copy> Kinematics<C> {
     /// `zero` and `one` in every sample.
     pub(crate) fn new(model: &Model, [zero, one]: [C; 2]) -> Self {
-        let of_link = |joint: &KernelJoint| LinkAxes {
-            w: [zero; 3],
-            map: WrenchMap::cells(zero),
-            direction: vec![[zero, zero, one]; joint.directions.len()],
-            linear: vec![[zero; 3]; joint.path.len()],
+        let of_link = |joint: &KernelJoint| {
+            let mut axes = vec![[zero; 3]; joint.directions.len() + joint.path.len()];
+            for d in &joint.directions {
+                axes[d.place] = [zero, zero, one];
+            }
+            LinkAxes {
+                w: [zero; 3],
+                map: WrenchMap::cells(zero),
+                axes,
+            }
         };
         Self {
             travel: vec![[zero; 2]; model.n_joints()],
@@ -47,14 +52,18 @@ impl<C: Copy> Kinematics<C> {
         }
     }
 
-    /// Sines and cosines of all joints: side by side, for they wait for nothing but themselves.
+    /// Sine and cosine of joint `j`.
     #[inline(always)]
-    pub(crate) fn turn_joints<T: Lane<Cell = C>>(&mut self, at: T::At, model: &Model, q: &[C]) {
-        for ((joint, q), travel) in model.joints.iter().zip(q).zip(&mut self.travel) {
-            for part in 0..T::PARTS {
-                let at = T::part(at, part);
-                Travel::new(joint, T::read(at, q)).write(at, travel);
-            }
+    pub(crate) fn turn_joint<T: Lane<Cell = C>>(
+        &mut self,
+        at: T::At,
+        model: &Model,
+        j: usize,
+        q: &C,
+    ) {
+        for part in 0..T::PARTS {
+            let at = T::part(at, part);
+            Travel::new(&model.joints[j], T::read(at, q)).write(at, &mut self.travel[j]);
         }
     }
 
@@ -110,11 +119,11 @@ impl<C: Copy> LinkAxes<C> {
     /// Axis of the `k`-th joint on the link's path, of direction `d`, at the frame of its joint.
     #[inline(always)]
     pub(crate) fn axis<T: Lane<Cell = C>>(&self, at: T::At, d: &Direction, k: usize) -> Screw<T> {
-        let direction = read(at, &self.direction[d.index]);
+        let direction = read(at, &self.axes[d.place]);
         match d.kind {
             JointKind::Revolute => Screw {
                 angular: direction,
-                linear: read(at, &self.linear[k]),
+                linear: read(at, &self.axes[d.place + 1 + k - d.range.start]),
             },
             JointKind::Prismatic => Screw {
                 angular: zero(at),
@@ -213,49 +222,63 @@ impl<C: Copy> Outward<'_, C> {
         let Some((own, others)) = self.parent.directions.split_last() else {
             return;
         };
-        let reach = self.joint.step.translation;
-        // Side by side, not by index: where each of them ends is all there is to check.
-        let mut from = self.below.linear.iter();
-        let mut to = here.linear.iter_mut();
-        let mut turned = here.direction.iter_mut();
-        let mut straight = self.below.direction.iter();
+        let Fixed {
+            reaches,
+            translation: reach,
+            ..
+        } = self.joint.step;
+        // The link below has the same axes in the same order; its own come last.
+        let (mut from, mut to) = (self.below.axes.as_slice(), here.axes.as_mut_slice());
         for d in others {
-            let (Some(outside), Some(turned)) = (straight.next(), turned.next()) else {
+            let Some(([outside, inside @ ..], [turned, out @ ..])) =
+                split_both(&mut from, &mut to, 1 + d.range.end - d.range.start)
+            else {
                 return;
             };
             let outside = read(at, outside);
             let direction = into_joint(step, outside);
             write(at, direction, turned);
-            for _ in d.range.start..d.range.end {
-                let (Some(from), Some(to)) = (from.next(), to.next()) else {
-                    return;
-                };
-                if d.kind == JointKind::Prismatic {
-                    continue;
-                }
-                let inside = read(at, from);
-                let shifted = shift_where(self.joint.step.reaches, reach, inside, outside);
-                write(at, carried_speed(step, direction, shifted), to);
+            if d.kind == JointKind::Prismatic {
+                continue;
+            }
+            for (inside, out) in inside.iter().zip(out) {
+                let shifted = shift_where(reaches, reach, read(at, inside), outside);
+                write(at, carried_speed(step, direction, shifted), out);
             }
         }
+        let ([_, inside @ ..], [turned, out @ ..]) = (from, to) else {
+            return;
+        };
         // The axis of the joint below itself is z there, and stays z where the two are parallel.
         let direction = if self.joint.directions.len() == others.len() + 1 {
             z_axis(at)
         } else {
             let direction = z_beyond(at, step);
-            let Some(turned) = turned.next() else { return };
             write(at, direction, turned);
             direction
         };
         if own.kind == JointKind::Prismatic {
             return;
         }
-        // The link's own joint has no speed there.
-        while let (Some(from), Some(to)) = (from.next(), to.next()) {
-            let shifted = shift_about_z(reach, read(at, from));
-            write(at, carried_speed(step, direction, shifted), to);
+        for (inside, out) in inside.iter().zip(out) {
+            let shifted = shift_about_z(reach, read(at, inside));
+            write(at, carried_speed(step, direction, shifted), out);
         }
     }
+}
+
+/// The next `n` of both, which then begin behind them.
+#[inline(always)]
+fn split_both<'a, C>(
+    from: &mut &'a [C],
+    to: &mut &'a mut [C],
+    n: usize,
+) -> Option<(&'a [C], &'a mut [C])> {
+    let (inside, rest) = from.split_at_checked(n)?;
+    *from = rest;
+    let (out, rest) = std::mem::take(to).split_at_mut_checked(n)?;
+    *to = rest;
+    Some((inside, out))
 }
 
 /// A vector of the joint below's frame in a joint's.

@@ -40,8 +40,8 @@ pub(crate) struct KernelJoint {
 /// Joints on a link's path whose axes stay parallel.
 #[derive(Debug, Clone)]
 pub(crate) struct Direction {
-    /// Its place among the directions of the path, the same for every link further out.
-    pub(crate) index: usize,
+    /// Where it stands among the axes of the path (see `LinkAxes`), the same for every link further out.
+    pub(crate) place: usize,
     /// Positions on the path.
     pub(crate) range: Range<usize>,
     /// A slide stands alone: its axis has no angular part to share.
@@ -142,8 +142,8 @@ impl KernelJoint {
         let here = path.len() - 1;
         let turns = step.rotation != Rotation::None;
         let n_below = directions.len();
-        for d in &mut directions {
-            let next = d.index + 1 == n_below;
+        for (k, d) in directions.iter_mut().enumerate() {
+            let next = k + 1 == n_below;
             d.across = (d.across && !turns) || (next && step.rotation == Rotation::Quarter);
         }
         match directions.last_mut() {
@@ -151,7 +151,8 @@ impl KernelJoint {
                 last.range.end = here + 1;
             }
             _ => directions.push(Direction {
-                index: n_below,
+                // Before it stand one direction each and the joints.
+                place: n_below + here,
                 range: here..here + 1,
                 kind,
                 across: false,

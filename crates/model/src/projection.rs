@@ -15,7 +15,6 @@ use crate::parameter::ParameterKind;
 use crate::plan::{ALL, ASK, BASE_XX, BASE_YY, LinkPlan};
 use crate::robot::JointKind;
 use crate::wrench_map::{ABOUT_Z, ACROSS, ANY, SLIDE, WrenchMap};
-use std::slice::Iter;
 
 /// Rows of tiles: packed, without the columns' signs.
 pub(crate) const TILES: u8 = 0;
@@ -35,10 +34,20 @@ pub(crate) fn fill<T: Lane, const ROWS: u8>(
     cells: &mut [T::Cell],
 ) {
     let n = model.n_joints();
-    kinematics.turn_joints::<T>(at, model, q);
-    for (j, joint) in model.joints.iter().enumerate() {
-        kinematics.go_out::<T>(at, model, j, [&qd[j], &qdd[j]]);
-        let link = &target.plan.links[j];
+    if let Some(q) = q.first() {
+        kinematics.turn_joint::<T>(at, model, 0, q);
+    }
+    // Side by side, not by index: where they end is all there is to check.
+    let plans = target.plan.links.iter().zip(&target.plan.drives);
+    let speeds = qd.iter().zip(qdd);
+    for (j, ((joint, (link, drives)), (qd, qdd))) in
+        model.joints.iter().zip(plans).zip(speeds).enumerate()
+    {
+        kinematics.go_out::<T>(at, model, j, [qd, qdd]);
+        // One joint ahead: long chains of products, while there is other work.
+        if let Some(q) = q.get(j + 1) {
+            kinematics.turn_joint::<T>(at, model, j + 1, q);
+        }
         if !link.is_empty() {
             let of = OfLink {
                 joint,
@@ -49,15 +58,15 @@ pub(crate) fn fill<T: Lane, const ROWS: u8>(
             let (axes, posed) = (&kinematics.links[j], &mut kinematics.posed);
             of.project::<T, ROWS>(at, axes, posed, cells);
         }
-        for (d, &(kind, column)) in target.plan.drives[j].iter().enumerate() {
+        for (d, &(kind, column)) in drives.iter().enumerate() {
             let place = if ROWS == DENSE { column } else { d };
             let cell = &mut cells[target.drives[j] + place];
             for part in 0..T::PARTS {
                 let at = T::part(at, part);
                 let entry = match kind {
-                    ParameterKind::Ia => T::read(at, &qdd[j]),
-                    ParameterKind::Fv => T::read(at, &qd[j]),
-                    ParameterKind::Fc => T::read(at, &qd[j]).sign(),
+                    ParameterKind::Ia => T::read(at, qdd),
+                    ParameterKind::Fv => T::read(at, qd),
+                    ParameterKind::Fc => T::read(at, qd).sign(),
                     _ => T::splat(at, 1.0),
                 };
                 entry.write(at, cell);
@@ -116,51 +125,36 @@ impl OfLink<'_> {
         else {
             return;
         };
-        // Side by side, not by index: where they end is all there is to check.
-        let mut rows = rows.iter();
-        let mut linear = axes.linear.iter();
-        for (d, v) in others.iter().zip(&axes.direction) {
+        let (mut axes, mut rows) = (axes.axes.as_slice(), rows);
+        for d in others {
             let n = d.range.end - d.range.start;
+            let (Some(([v, linear @ ..], rest)), Some((of_direction, further))) =
+                (axes.split_at_checked(1 + n), rows.split_at_checked(n))
+            else {
+                return;
+            };
+            (axes, rows) = (rest, further);
+            let path = (of_direction, linear);
             match (d.kind, d.across) {
                 (JointKind::Prismatic, _) => {
-                    for _ in 0..n {
-                        let (Some(&row), Some(_)) = (rows.next(), linear.next()) else {
-                            return;
-                        };
+                    for &row in of_direction {
                         self.project_slide::<T, WANTED, ROWS>(at, row, v, map, cells);
                     }
                 }
                 (_, true) => {
-                    self.project_direction::<T, ACROSS, WANTED, ROWS>(
-                        at,
-                        n,
-                        (&mut rows, &mut linear),
-                        v,
-                        map,
-                        cells,
-                    );
+                    self.project_direction::<T, ACROSS, WANTED, ROWS>(at, path, v, map, cells);
                 }
-                _ => {
-                    self.project_direction::<T, ANY, WANTED, ROWS>(
-                        at,
-                        n,
-                        (&mut rows, &mut linear),
-                        v,
-                        map,
-                        cells,
-                    );
-                }
+                _ => self.project_direction::<T, ANY, WANTED, ROWS>(at, path, v, map, cells),
             }
         }
-        let Some(v) = axes.direction.last() else {
-            return;
-        };
+        let [v, linear @ ..] = axes else { return };
         if own.kind == JointKind::Prismatic {
             return self.project_slide::<T, WANTED, ROWS>(at, last, v, map, cells);
         }
-        let n = own.range.end - own.range.start - 1;
-        let path = (&mut rows, &mut linear);
-        self.project_direction::<T, ABOUT_Z, WANTED, ROWS>(at, n, path, v, map, cells);
+        if !rows.is_empty() {
+            let path = (rows, linear);
+            self.project_direction::<T, ABOUT_Z, WANTED, ROWS>(at, path, v, map, cells);
+        }
         let row = self.row::<_, ROWS>(last, cells);
         for part in 0..T::PARTS {
             let at = T::part(at, part);
@@ -172,32 +166,23 @@ impl OfLink<'_> {
         }
     }
 
-    /// Rows of the next `n` joints of `path`, revolute and parallel: what the tensor's columns say is the same in all of them.
+    /// Rows of revolute joints, parallel to each other: what the tensor's columns say is the same in all of them.
     #[inline(always)]
     fn project_direction<T: Lane, const FORM: u8, const WANTED: u16, const ROWS: u8>(
         &self,
         at: T::At,
-        n: usize,
-        (rows, linear): (&mut Iter<'_, usize>, &mut Iter<'_, V3<T::Cell>>),
+        (rows, linear): (&[usize], &[V3<T::Cell>]),
         v: &V3<T::Cell>,
         map: &WrenchMap<T::Cell>,
         cells: &mut [T::Cell],
     ) {
-        if n == 0 {
-            return;
-        }
-        let start = (rows.as_slice(), linear.as_slice());
         for part in 0..T::PARTS {
             let at = T::part(at, part);
             let v = read(at, v);
             let tensor = self.tensor::<T, FORM, WANTED>(at, v, map);
-            (*rows, *linear) = (start.0.iter(), start.1.iter());
-            for _ in 0..n {
-                let (Some(&row), Some(linear)) = (rows.next(), linear.next()) else {
-                    return;
-                };
+            for (&row, f) in rows.iter().zip(linear) {
                 let row = self.row::<_, ROWS>(row, cells);
-                let f = read(at, linear);
+                let f = read(at, f);
                 self.put_tensor::<T, WANTED, ROWS>(at, row, &tensor);
                 self.put_moments::<T, FORM, WANTED, ROWS>(at, row, (v, f), map);
             }

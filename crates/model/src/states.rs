@@ -220,14 +220,9 @@ fn load(lanes: &mut [F64x8], all: &[f64], n_samples: usize, first: usize) {
         }
         return;
     }
-    let mut rest = &all[first..];
-    for lane in lanes {
-        let Some((full, next)) = rest.split_first_chunk::<8>() else {
-            return;
-        };
+    for (lane, row) in lanes.iter_mut().zip(all.chunks_exact(n_samples)) {
         // By the slice: an array of its own would go by way of the stack.
-        lane.0.copy_from_slice(full);
-        rest = next.get(n_samples - 8..).unwrap_or_default();
+        lane.0.copy_from_slice(&row[first..first + 8]);
     }
 }
 
