@@ -45,7 +45,7 @@ fn least_squares(case: &Case) {
     let time = cpu_time(3, || {
         black_box(jobs::least_squares(case, &columns, &states, &torques));
     });
-    line(&format!("least squares, {what}"), time, 1, "s", 1.0);
+    line(&format!("least squares, {what}"), time, 1, "ms", 1e3);
     let start = cpu_seconds();
     black_box(jobs::least_squares_qr(case, &columns, &states, &torques));
     println!(

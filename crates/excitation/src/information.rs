@@ -107,6 +107,8 @@ struct Tile {
     /// The entries' keys; what only fills the tile up has one of its own, that of no entry.
     keys: [usize; TILE],
     consecutive: bool,
+    /// How many entries there are to fold.
+    len: usize,
 }
 
 impl<'a> Fold<'a> {
@@ -125,6 +127,7 @@ impl<'a> Fold<'a> {
                     std::array::from_fn(|k| *keys.get(tile * TILE + k).unwrap_or(&none));
                 Tile {
                     rows: keys.map(|key| rows[key]),
+                    len: TILE.min(entries - tile * TILE),
                     consecutive: keys.is_sorted_by(|a, b| a + 1 == *b),
                     keys,
                 }
@@ -176,18 +179,7 @@ impl pulp::WithSimd for Take<'_, '_> {
                         sum,
                     };
                     for part in 0..LANES / S::F64_LANES {
-                        // Sixteen sums, and what enters them, fit 32 registers, not 16. Of a tile with itself only half is
-                        // needed.
-                        if S::REGISTER_COUNT >= 32 {
-                            pair.products::<S, TILE, TILE>(simd, part, 0);
-                            continue;
-                        }
-                        if a == b {
-                            pair.products::<S, 2, 2>(simd, part, 0);
-                        } else {
-                            pair.products::<S, TILE, 2>(simd, part, 0);
-                        }
-                        pair.products::<S, TILE, 2>(simd, part, 2);
+                        pair.fold(simd, part);
                     }
                 }
             }
@@ -206,9 +198,38 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    /// Products of the first `A` entries of the one with `B` of the other, from entry `from` on.
+    /// All products of the two tiles; of a tile with itself half of them is all.
     #[inline(always)]
-    fn products<S: pulp::Simd, const A: usize, const B: usize>(
+    fn fold<S: pulp::Simd>(&mut self, simd: S, part: usize) {
+        let diagonal = self.places[0] == self.places[1];
+        // Sixteen sums, and what enters them, fit 32 registers, not 16.
+        if S::REGISTER_COUNT >= 32 {
+            match (diagonal, self.tiles[1].len) {
+                (false, 1) => self.products::<S, TILE, 1, false>(simd, part, 0),
+                (false, 2) => self.products::<S, TILE, 2, false>(simd, part, 0),
+                (false, 3) => self.products::<S, TILE, 3, false>(simd, part, 0),
+                (false, _) => self.products::<S, TILE, TILE, false>(simd, part, 0),
+                (true, 1) => self.products::<S, 1, 1, true>(simd, part, 0),
+                (true, 2) => self.products::<S, 2, 2, true>(simd, part, 0),
+                (true, 3) => self.products::<S, 3, 3, true>(simd, part, 0),
+                (true, _) => self.products::<S, TILE, TILE, true>(simd, part, 0),
+            }
+            return;
+        }
+        if diagonal {
+            self.products::<S, 2, 2, true>(simd, part, 0);
+        } else {
+            self.products::<S, TILE, 2, false>(simd, part, 0);
+        }
+        if self.tiles[1].len > 2 {
+            self.products::<S, TILE, 2, false>(simd, part, 2);
+        }
+    }
+
+    /// Products of the first `A` entries of the one with `B` of the other, from entry `from` on; of the diagonal only with
+    /// those from the entry itself on.
+    #[inline(always)]
+    fn products<S: pulp::Simd, const A: usize, const B: usize, const DIAGONAL: bool>(
         &mut self,
         simd: S,
         part: usize,
@@ -230,7 +251,9 @@ impl Pair<'_> {
             for s in 0..A {
                 let x = S::as_simd_f64s(&a[s].0).0[part];
                 for t in 0..B {
-                    sums[s][t] = simd.mul_add_f64s(x, y[t], sums[s][t]);
+                    if !DIAGONAL || t >= s {
+                        sums[s][t] = simd.mul_add_f64s(x, y[t], sums[s][t]);
+                    }
                 }
             }
         }

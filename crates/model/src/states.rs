@@ -157,72 +157,101 @@ impl JointStates {
     }
 }
 
-/// Eight samples of every joint, the last sample repeated where there are fewer.
+/// Blocks of eight samples of every joint, the last sample repeated where there are fewer.
 #[derive(Debug, Clone)]
 pub(crate) struct LaneStates {
+    n_joints: usize,
     q: Vec<F64x8>,
     qd: Vec<F64x8>,
     qdd: Vec<F64x8>,
 }
 
 impl LaneStates {
-    pub(crate) fn new(n_joints: usize) -> Self {
-        let zeros = vec![F64x8::ZERO; n_joints];
+    pub(crate) fn new(n_joints: usize, n_blocks: usize) -> Self {
+        let zeros = vec![F64x8::ZERO; n_joints * n_blocks];
         Self {
+            n_joints,
             q: zeros.clone(),
             qd: zeros.clone(),
             qdd: zeros,
         }
     }
 
-    /// Positions, velocities and accelerations, one lane a joint.
-    pub(crate) fn state(&self) -> [&[F64x8]; 3] {
-        [&self.q, &self.qd, &self.qdd]
+    /// Positions, velocities and accelerations of a block, one lane a joint.
+    #[inline]
+    pub(crate) fn block(&self, block: usize) -> [&[F64x8]; 3] {
+        let here = block * self.n_joints..(block + 1) * self.n_joints;
+        [
+            &self.q[here.clone()],
+            &self.qd[here.clone()],
+            &self.qdd[here],
+        ]
     }
 
+    /// The samples from `first` on, as many as there is room for: block after block of a joint, then the next joint. So
+    /// memory is read in long pieces.
     pub(crate) fn load(&mut self, states: &JointStates, first: usize) {
-        pulp::Arch::new().dispatch(Load {
-            lanes: self,
-            states,
-            first,
-        });
+        let lanes = [&mut *self.q, &mut *self.qd, &mut *self.qdd];
+        let all = [&*states.q, &*states.qd, &*states.qdd];
+        load(lanes, all, self.n_joints, first);
     }
+}
+
+/// Into `lanes` (blocks × rows) the samples from `first` on of `all` (rows × samples).
+pub(crate) fn load<const N: usize>(
+    lanes: [&mut [F64x8]; N],
+    all: [&[f64]; N],
+    n_rows: usize,
+    first: usize,
+) {
+    pulp::Arch::new().dispatch(Load {
+        lanes,
+        all,
+        n_rows,
+        first,
+    });
 }
 
 /// Written with the registers the kernels read with: a wide read of narrow writes has to wait.
-struct Load<'a> {
-    lanes: &'a mut LaneStates,
-    states: &'a JointStates,
+struct Load<'a, const N: usize> {
+    lanes: [&'a mut [F64x8]; N],
+    all: [&'a [f64]; N],
+    n_rows: usize,
     first: usize,
 }
 
-impl pulp::WithSimd for Load<'_> {
+impl<const N: usize> pulp::WithSimd for Load<'_, N> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self {
-            lanes,
-            states,
-            first,
-        } = self;
-        load(&mut lanes.q, &states.q, states.n_samples, first);
-        load(&mut lanes.qd, &states.qd, states.n_samples, first);
-        load(&mut lanes.qdd, &states.qdd, states.n_samples, first);
-    }
-}
-
-#[inline(always)]
-fn load(lanes: &mut [F64x8], all: &[f64], n_samples: usize, first: usize) {
-    if first + 8 > n_samples {
-        for (j, lane) in lanes.iter_mut().enumerate() {
-            *lane = eight(&all[j * n_samples..][..n_samples], first);
+        let n = self.n_rows;
+        if n == 0 {
+            return;
         }
-        return;
-    }
-    for (lane, row) in lanes.iter_mut().zip(all.chunks_exact(n_samples)) {
-        // By the slice: an array of its own would go by way of the stack.
-        lane.0.copy_from_slice(&row[first..first + 8]);
+        let n_samples = self.all[0].len() / n;
+        let n_blocks = self.lanes[0].len() / n;
+        let full = n_blocks.min((n_samples - self.first) / 8);
+        for (lanes, all) in self.lanes.into_iter().zip(self.all) {
+            let rows = all.chunks_exact(n_samples);
+            if n_blocks == 1 && full == 1 {
+                for (lane, row) in lanes.iter_mut().zip(rows) {
+                    // By the slice: an array of its own would go by way of the stack.
+                    lane.0.copy_from_slice(&row[self.first..self.first + 8]);
+                }
+                continue;
+            }
+            for (j, row) in rows.enumerate() {
+                let column = lanes[j..].iter_mut().step_by(n);
+                for (lane, eight) in column.zip(row[self.first..].as_chunks::<8>().0) {
+                    lane.0.copy_from_slice(eight);
+                }
+                let rest = self.first + 8 * full;
+                if full < n_blocks && rest < n_samples {
+                    lanes[full * n + j] = eight(row, rest);
+                }
+            }
+        }
     }
 }
 

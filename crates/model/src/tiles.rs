@@ -7,7 +7,7 @@ use crate::parameter::Columns;
 use crate::plan::Plan;
 use crate::projection::TILES;
 use crate::regressor::Fill;
-use crate::states::{JointStates, LaneStates, eight};
+use crate::states::{JointStates, LaneStates, load};
 use crate::wide::F64x8;
 use std::ops::Range;
 
@@ -24,6 +24,8 @@ pub struct RegressorTiles {
     plan: Plan,
     packing: Packing,
     lanes: LaneStates,
+    /// Blocks × joints.
+    observed: Vec<F64x8>,
     kinematics: Kinematics<F64x8>,
     /// First tile of each joint's row in a block, and one past the last row's.
     first: Vec<usize>,
@@ -67,7 +69,8 @@ impl RegressorTiles {
         Self {
             plan,
             packing,
-            lanes: LaneStates::new(n),
+            lanes: LaneStates::new(n, capacity),
+            observed: vec![F64x8::ZERO; n * capacity],
             kinematics: Kinematics::new(model, [F64x8::ZERO, F64x8::ONE]),
             first,
             rows,
@@ -105,9 +108,14 @@ impl RegressorTiles {
         }
         let n_samples = (n_all - first).min(self.capacity * LANES);
         self.n_blocks = n_samples.div_ceil(LANES);
+        self.lanes.load(states, first);
+        if let Some(y) = observed {
+            load([&mut self.observed], [y], n, first);
+        } else {
+            self.observed.fill(F64x8::ZERO);
+        }
         for block in 0..self.n_blocks {
             let cells = &mut self.cells[block * self.stride * Self::TILE..];
-            self.lanes.load(states, first + block * LANES);
             let fill = Fill::<_, TILES> {
                 model,
                 rows: Target {
@@ -115,16 +123,15 @@ impl RegressorTiles {
                     links: &self.rows,
                     drives: &self.drives,
                 },
-                state: self.lanes.state(),
+                state: self.lanes.block(block),
                 kinematics: &mut self.kinematics,
                 cells,
             };
             fill.over_eight();
             // The observation is the last entry of a row.
-            for (i, (keys, start)) in self.packing.keys.iter().zip(&self.first).enumerate() {
-                cells[start * Self::TILE + keys.len() - 1] = observed.map_or(F64x8::ZERO, |y| {
-                    eight(&y[i * n_all..][..n_all], first + block * LANES)
-                });
+            let of_block = &self.observed[block * n..][..n];
+            for ((keys, start), y) in self.packing.keys.iter().zip(&self.first).zip(of_block) {
+                cells[start * Self::TILE + keys.len() - 1] = *y;
             }
         }
         let rest = n_samples % LANES;
