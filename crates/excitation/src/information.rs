@@ -166,13 +166,14 @@ impl pulp::WithSimd for Take<'_, '_> {
             sum,
             ..
         } = self.fold;
+        let (blocks, stride) = (self.tiles.blocks(), self.tiles.stride());
         for (joint, (tiles, &weight)) in tiles.iter().zip(*joint_weights).enumerate() {
             let first = self.tiles.row(joint).start;
             for (a, left) in tiles.iter().enumerate() {
                 for (b, right) in tiles.iter().enumerate().skip(a) {
                     let mut pair = Pair {
-                        blocks: self.tiles.blocks(),
-                        stride: self.tiles.stride(),
+                        blocks,
+                        stride,
                         places: [first + a, first + b],
                         tiles: [left, right],
                         weight,

@@ -230,8 +230,9 @@ impl<C: Copy> Outward<'_, C> {
         // The link below has the same axes in the same order; its own come last.
         let (mut from, mut to) = (self.below.axes.as_slice(), here.axes.as_mut_slice());
         for d in others {
-            let Some(([outside, inside @ ..], [turned, out @ ..])) =
-                split_both(&mut from, &mut to, 1 + d.range.end - d.range.start)
+            let n = 1 + d.range.end - d.range.start;
+            let (Some([outside, inside @ ..]), Some([turned, out @ ..])) =
+                (from.split_off(..n), to.split_off_mut(..n))
             else {
                 return;
             };
@@ -265,20 +266,6 @@ impl<C: Copy> Outward<'_, C> {
             write(at, carried_speed(step, direction, shifted), out);
         }
     }
-}
-
-/// The next `n` of both, which then begin behind them.
-#[inline(always)]
-fn split_both<'a, C>(
-    from: &mut &'a [C],
-    to: &mut &'a mut [C],
-    n: usize,
-) -> Option<(&'a [C], &'a mut [C])> {
-    let (inside, rest) = from.split_at_checked(n)?;
-    *from = rest;
-    let (out, rest) = std::mem::take(to).split_at_mut_checked(n)?;
-    *to = rest;
-    Some((inside, out))
 }
 
 /// A vector of the joint below's frame in a joint's.

@@ -46,7 +46,7 @@ pub fn torque_contraction_gradient(
         over_eight(&mut TorqueContraction {
             model,
             terms: &terms,
-            state: lanes.block(0),
+            state: lanes.state(),
             work,
             weight: Weight::Given(&weights),
         });
@@ -82,7 +82,7 @@ pub fn squared_torque_gradient(
         over_eight(&mut TorqueContraction {
             model,
             terms: &terms,
-            state: lanes.block(0),
+            state: lanes.state(),
             work,
             weight: Weight::TimesTorque(&factors),
         });
@@ -114,7 +114,7 @@ pub fn regressor_contraction_gradient(
         Fill::<_, BLOCKS> {
             model,
             rows: rows.all(),
-            state: lanes.block(0),
+            state: lanes.state(),
             kinematics: &mut kinematics,
             cells: y.entries_mut(),
         }
@@ -123,7 +123,7 @@ pub fn regressor_contraction_gradient(
         RegressorContraction {
             model,
             plan: &rows.plan,
-            state: lanes.block(0),
+            state: lanes.state(),
             kinematics: &kinematics,
             weights: g.entries(),
             work,
@@ -147,7 +147,7 @@ fn over_lanes(
     );
     let mut gradient = JointStates::zeros(n, n_samples);
     let mut work = Workspace::new(model, F64x8::ZERO);
-    let mut lanes = LaneStates::new(n, 1);
+    let mut lanes = LaneStates::new(n);
     for first in (0..n_samples).step_by(8) {
         lanes.load(states, first);
         contract(first, &lanes, &mut work);

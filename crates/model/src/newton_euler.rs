@@ -49,14 +49,14 @@ pub fn inverse_dynamics_batch(model: &Model, parameters: &[f64], states: &JointS
     let parameters = model.kernel_parameters(parameters);
     let mut torque = vec![0.0; n * n_samples];
     let mut work = Workspace::new(model, F64x8::ZERO);
-    let mut lanes = LaneStates::new(n, 1);
+    let mut lanes = LaneStates::new(n);
     let mut out = vec![F64x8::ZERO; n];
     for first in (0..n_samples).step_by(8) {
         lanes.load(states, first);
         over_eight(&mut Recursion {
             model,
             parameters: &parameters,
-            state: lanes.block(0),
+            state: lanes.state(),
             work: &mut work,
             torque: &mut out,
         });

@@ -128,12 +128,11 @@ impl OfLink<'_> {
         let (mut axes, mut rows) = (axes.axes.as_slice(), rows);
         for d in others {
             let n = d.range.end - d.range.start;
-            let (Some(([v, linear @ ..], rest)), Some((of_direction, further))) =
-                (axes.split_at_checked(1 + n), rows.split_at_checked(n))
+            let (Some([v, linear @ ..]), Some(of_direction)) =
+                (axes.split_off(..=n), rows.split_off(..n))
             else {
                 return;
             };
-            (axes, rows) = (rest, further);
             let path = (of_direction, linear);
             match (d.kind, d.across) {
                 (JointKind::Prismatic, _) => {

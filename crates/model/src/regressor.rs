@@ -260,7 +260,7 @@ impl BlockFiller {
     pub fn new(model: &Model, columns: &Columns) -> Self {
         Self {
             rows: Rows::new(model, columns),
-            lanes: LaneStates::new(model.n_joints(), 1),
+            lanes: LaneStates::new(model.n_joints()),
             kinematics: Kinematics::new(model, [F64x8::ZERO, F64x8::ONE]),
         }
     }
@@ -286,7 +286,7 @@ impl BlockFiller {
         let fill = Fill::<_, BLOCKS> {
             model,
             rows: self.rows.all(),
-            state: self.lanes.block(0),
+            state: self.lanes.state(),
             kinematics: &mut self.kinematics,
             cells: &mut block.entries,
         };

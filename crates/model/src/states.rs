@@ -157,101 +157,147 @@ impl JointStates {
     }
 }
 
-/// Blocks of eight samples of every joint, the last sample repeated where there are fewer.
+/// Eight samples of every joint, the last sample repeated where there are fewer.
 #[derive(Debug, Clone)]
 pub(crate) struct LaneStates {
-    n_joints: usize,
     q: Vec<F64x8>,
     qd: Vec<F64x8>,
     qdd: Vec<F64x8>,
 }
 
 impl LaneStates {
-    pub(crate) fn new(n_joints: usize, n_blocks: usize) -> Self {
-        let zeros = vec![F64x8::ZERO; n_joints * n_blocks];
+    pub(crate) fn new(n_joints: usize) -> Self {
+        let zeros = vec![F64x8::ZERO; n_joints];
         Self {
-            n_joints,
             q: zeros.clone(),
             qd: zeros.clone(),
             qdd: zeros,
         }
     }
 
-    /// Positions, velocities and accelerations of a block, one lane a joint.
-    #[inline]
-    pub(crate) fn block(&self, block: usize) -> [&[F64x8]; 3] {
-        let here = block * self.n_joints..(block + 1) * self.n_joints;
-        [
-            &self.q[here.clone()],
-            &self.qd[here.clone()],
-            &self.qdd[here],
-        ]
+    /// Positions, velocities and accelerations, one lane a joint.
+    pub(crate) fn state(&self) -> [&[F64x8]; 3] {
+        [&self.q, &self.qd, &self.qdd]
     }
 
-    /// The samples from `first` on, as many as there is room for: block after block of a joint, then the next joint. So
-    /// memory is read in long pieces.
     pub(crate) fn load(&mut self, states: &JointStates, first: usize) {
-        let lanes = [&mut *self.q, &mut *self.qd, &mut *self.qdd];
-        let all = [&*states.q, &*states.qd, &*states.qdd];
-        load(lanes, all, self.n_joints, first);
+        self.load_ahead(states, first, usize::MAX);
+    }
+
+    /// The same, and asks memory for the samples from `next` on, if there are any.
+    pub(crate) fn load_ahead(&mut self, states: &JointStates, first: usize, next: usize) {
+        let arch = pulp::Arch::new();
+        arch.dispatch(Load {
+            lanes: self,
+            states,
+            first,
+        });
+        if next >= states.n_samples {
+            return;
+        }
+        for all in [&states.q, &states.qd, &states.qdd] {
+            ask_for(arch, all, states.n_samples, next);
+        }
     }
 }
 
-/// Into `lanes` (blocks × rows) the samples from `first` on of `all` (rows × samples).
-pub(crate) fn load<const N: usize>(
-    lanes: [&mut [F64x8]; N],
-    all: [&[f64]; N],
-    n_rows: usize,
+/// Has memory bring eight samples of all rows (rows × samples) near, without waiting for them.
+#[inline]
+pub(crate) fn ask_for(arch: pulp::Arch, all: &[f64], n_samples: usize, first: usize) {
+    if first >= n_samples {
+        return;
+    }
+    #[cfg(target_arch = "x86_64")]
+    {
+        // Into the second-level cache: it is not needed yet.
+        use std::arch::x86_64::_MM_HINT_T1;
+        let sse = match arch {
+            pulp::Arch::V4(simd) => simd.sse,
+            pulp::Arch::V3(simd) => simd.sse,
+            _ => return,
+        };
+        for x in all[first..].iter().step_by(n_samples) {
+            sse._mm_prefetch::<_MM_HINT_T1>(std::ptr::from_ref(x).cast());
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (arch, all);
+}
+
+/// Puts eight samples of every row (rows × samples) into the cell that is its own.
+pub(crate) fn scatter(
+    arch: pulp::Arch,
+    cells: &mut [F64x8],
+    places: &[usize],
+    (all, n_samples): (&[f64], usize),
     first: usize,
 ) {
-    pulp::Arch::new().dispatch(Load {
-        lanes,
+    arch.dispatch(Scatter {
+        cells,
+        places,
         all,
-        n_rows,
+        n_samples,
         first,
     });
 }
 
-/// Written with the registers the kernels read with: a wide read of narrow writes has to wait.
-struct Load<'a, const N: usize> {
-    lanes: [&'a mut [F64x8]; N],
-    all: [&'a [f64]; N],
-    n_rows: usize,
+struct Scatter<'a> {
+    cells: &'a mut [F64x8],
+    places: &'a [usize],
+    all: &'a [f64],
+    n_samples: usize,
     first: usize,
 }
 
-impl<const N: usize> pulp::WithSimd for Load<'_, N> {
+impl pulp::WithSimd for Scatter<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let n = self.n_rows;
-        if n == 0 {
-            return;
+        let rows = self.all.chunks_exact(self.n_samples);
+        for (&place, row) in self.places.iter().zip(rows) {
+            load(&mut self.cells[place], row, self.first);
         }
-        let n_samples = self.all[0].len() / n;
-        let n_blocks = self.lanes[0].len() / n;
-        let full = n_blocks.min((n_samples - self.first) / 8);
-        for (lanes, all) in self.lanes.into_iter().zip(self.all) {
-            let rows = all.chunks_exact(n_samples);
-            if n_blocks == 1 && full == 1 {
-                for (lane, row) in lanes.iter_mut().zip(rows) {
-                    // By the slice: an array of its own would go by way of the stack.
-                    lane.0.copy_from_slice(&row[self.first..self.first + 8]);
-                }
-                continue;
-            }
-            for (j, row) in rows.enumerate() {
-                let column = lanes[j..].iter_mut().step_by(n);
-                for (lane, eight) in column.zip(row[self.first..].as_chunks::<8>().0) {
-                    lane.0.copy_from_slice(eight);
-                }
-                let rest = self.first + 8 * full;
-                if full < n_blocks && rest < n_samples {
-                    lanes[full * n + j] = eight(row, rest);
-                }
-            }
-        }
+    }
+}
+
+/// Written with the registers the kernels read with: a wide read of narrow writes has to wait.
+struct Load<'a> {
+    lanes: &'a mut LaneStates,
+    states: &'a JointStates,
+    first: usize,
+}
+
+impl pulp::WithSimd for Load<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self {
+            lanes,
+            states,
+            first,
+        } = self;
+        load_all(&mut lanes.q, &states.q, states.n_samples, first);
+        load_all(&mut lanes.qd, &states.qd, states.n_samples, first);
+        load_all(&mut lanes.qdd, &states.qdd, states.n_samples, first);
+    }
+}
+
+#[inline(always)]
+fn load_all(lanes: &mut [F64x8], all: &[f64], n_samples: usize, first: usize) {
+    for (lane, row) in lanes.iter_mut().zip(all.chunks_exact(n_samples)) {
+        load(lane, row, first);
+    }
+}
+
+#[inline(always)]
+fn load(lane: &mut F64x8, row: &[f64], first: usize) {
+    if let Some(full) = row[first..].first_chunk::<8>() {
+        // By the slice: an array of its own would go by way of the stack.
+        lane.0.copy_from_slice(full);
+    } else {
+        *lane = eight(row, first);
     }
 }
 

@@ -7,7 +7,7 @@ use crate::parameter::Columns;
 use crate::plan::Plan;
 use crate::projection::TILES;
 use crate::regressor::Fill;
-use crate::states::{JointStates, LaneStates, load};
+use crate::states::{JointStates, LaneStates, ask_for, scatter};
 use crate::wide::F64x8;
 use std::ops::Range;
 
@@ -24,14 +24,14 @@ pub struct RegressorTiles {
     plan: Plan,
     packing: Packing,
     lanes: LaneStates,
-    /// Blocks × joints.
-    observed: Vec<F64x8>,
     kinematics: Kinematics<F64x8>,
     /// First tile of each joint's row in a block, and one past the last row's.
     first: Vec<usize>,
     /// Where the links' and drives' cells begin in a block, as [`Target`] wants them.
     rows: Vec<usize>,
     drives: Vec<usize>,
+    /// Where the observation of each joint stands in a block: it is the last entry of a row.
+    observations: Vec<usize>,
     /// Tiles of a block.
     stride: usize,
     /// Blocks of eight samples there is room for, and those filled last.
@@ -62,6 +62,9 @@ impl RegressorTiles {
         let cell = |joint: usize, entry: usize| first[joint] * Self::TILE + entry;
         let rows = packing.start.iter();
         let rows = rows.map(|&(joint, start)| cell(joint, start)).collect();
+        let observations = packing.keys.iter().enumerate();
+        let observations = observations.map(|(i, keys)| cell(i, keys.len() - 1));
+        let observations = observations.collect();
         let drives = packing.drives.iter().enumerate();
         let drives = drives.map(|(i, &start)| cell(i, start)).collect();
         // An odd number of tiles: the same tile of many blocks is spread over all sets of the cache.
@@ -69,12 +72,12 @@ impl RegressorTiles {
         Self {
             plan,
             packing,
-            lanes: LaneStates::new(n, capacity),
-            observed: vec![F64x8::ZERO; n * capacity],
+            lanes: LaneStates::new(n),
             kinematics: Kinematics::new(model, [F64x8::ZERO, F64x8::ONE]),
             first,
             rows,
             drives,
+            observations,
             stride,
             capacity,
             n_blocks: 0,
@@ -106,16 +109,17 @@ impl RegressorTiles {
         if let Some(y) = observed {
             assert_eq!(y.len(), n * n_all, "observations are not joints × samples");
         }
+        let arch = pulp::Arch::new();
         let n_samples = (n_all - first).min(self.capacity * LANES);
         self.n_blocks = n_samples.div_ceil(LANES);
-        self.lanes.load(states, first);
-        if let Some(y) = observed {
-            load([&mut self.observed], [y], n, first);
-        } else {
-            self.observed.fill(F64x8::ZERO);
-        }
         for block in 0..self.n_blocks {
             let cells = &mut self.cells[block * self.stride * Self::TILE..];
+            // The same block of the samples after these will be needed next.
+            let (here, next) = (
+                first + block * LANES,
+                first + (self.capacity + block) * LANES,
+            );
+            self.lanes.load_ahead(states, here, next);
             let fill = Fill::<_, TILES> {
                 model,
                 rows: Target {
@@ -123,15 +127,18 @@ impl RegressorTiles {
                     links: &self.rows,
                     drives: &self.drives,
                 },
-                state: self.lanes.block(block),
+                state: self.lanes.state(),
                 kinematics: &mut self.kinematics,
                 cells,
             };
             fill.over_eight();
-            // The observation is the last entry of a row.
-            let of_block = &self.observed[block * n..][..n];
-            for ((keys, start), y) in self.packing.keys.iter().zip(&self.first).zip(of_block) {
-                cells[start * Self::TILE + keys.len() - 1] = *y;
+            if let Some(y) = observed {
+                scatter(arch, cells, &self.observations, (y, n_all), here);
+                ask_for(arch, y, n_all, next);
+                continue;
+            }
+            for &cell in &self.observations {
+                cells[cell] = F64x8::ZERO;
             }
         }
         let rest = n_samples % LANES;
