@@ -166,15 +166,14 @@ impl pulp::WithSimd for Take<'_, '_> {
             sum,
             ..
         } = self.fold;
-        let (blocks, stride) = (self.tiles.blocks(), self.tiles.stride());
         for (joint, (tiles, &weight)) in tiles.iter().zip(*joint_weights).enumerate() {
-            let first = self.tiles.row(joint).start;
+            let (rows, stride) = (self.tiles.rows(joint), self.tiles.stride(joint));
             for (a, left) in tiles.iter().enumerate() {
                 for (b, right) in tiles.iter().enumerate().skip(a) {
                     let mut pair = Pair {
-                        blocks,
+                        rows,
                         stride,
-                        places: [first + a, first + b],
+                        places: [a, b],
                         tiles: [left, right],
                         weight,
                         sum,
@@ -190,7 +189,7 @@ impl pulp::WithSimd for Take<'_, '_> {
 
 /// Two tiles of a joint's row, and where their products go.
 struct Pair<'a> {
-    blocks: &'a [[F64x8; TILE]],
+    rows: &'a [[F64x8; TILE]],
     stride: usize,
     places: [usize; 2],
     tiles: [&'a Tile; 2],
@@ -240,10 +239,10 @@ impl Pair<'_> {
         // Told once, it need not be checked for every block.
         assert!(
             left < self.stride && right < self.stride,
-            "no such tile in a block"
+            "no such tile in a row"
         );
         let mut sums = [[simd.splat_f64s(0.0); B]; A];
-        for tiles in self.blocks.chunks_exact(self.stride) {
+        for tiles in self.rows.chunks_exact(self.stride) {
             let (a, b) = (&tiles[left], &tiles[right]);
             let mut y = [simd.splat_f64s(0.0); B];
             for t in 0..B {

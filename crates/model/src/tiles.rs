@@ -9,15 +9,14 @@ use crate::projection::TILES;
 use crate::regressor::Fill;
 use crate::states::{JointStates, LaneStates, ask_for, scatter};
 use crate::wide::F64x8;
-use std::ops::Range;
 
 /// Samples side by side in a block.
 const LANES: usize = 8;
 
 /// The torque regressor of some hundred samples, without what is always zero, in tiles of four entries.
 ///
-/// A joint's row holds the columns its torque depends on and, last, what was observed of it; eight samples are a block, and
-/// a block has the rows of all joints. Columns that are each other's negative, or stand twice, share an entry: products of
+/// A joint's row holds the columns its torque depends on and, last, what was observed of it; the rows of eight samples
+/// follow those of the eight before. Columns that are each other's negative, or stand twice, share an entry: products of
 /// entries become products of columns by [`Self::columns`].
 #[derive(Debug, Clone)]
 pub struct RegressorTiles {
@@ -25,15 +24,15 @@ pub struct RegressorTiles {
     packing: Packing,
     lanes: LaneStates,
     kinematics: Kinematics<F64x8>,
-    /// First tile of each joint's row in a block, and one past the last row's.
+    /// Where what is written to begins, in cells: links × joints on their paths, then each joint's drives, then its
+    /// observation. Of the first block, of the one being filled, and how far it is to the next.
+    origin: Vec<usize>,
+    here: Vec<usize>,
+    step: Vec<usize>,
+    /// First cell of each joint's rows, and one past the last.
     first: Vec<usize>,
-    /// Where the links' and drives' cells begin in a block, as [`Target`] wants them.
-    rows: Vec<usize>,
-    drives: Vec<usize>,
-    /// Where the observation of each joint stands in a block: it is the last entry of a row.
-    observations: Vec<usize>,
-    /// Tiles of a block.
-    stride: usize,
+    /// Tiles from one row of a joint to its next.
+    stride: Vec<usize>,
     /// Blocks of eight samples there is room for, and those filled last.
     capacity: usize,
     n_blocks: usize,
@@ -54,34 +53,34 @@ impl RegressorTiles {
         let plan = Plan::new(model, columns);
         let packing = Packing::new(model, columns, &plan);
         let mut first = vec![0];
-        let mut n_tiles = 0;
-        for keys in &packing.keys {
-            n_tiles += keys.len().div_ceil(Self::TILE);
-            first.push(n_tiles);
+        let mut stride = Vec::with_capacity(n);
+        for (i, keys) in packing.keys.iter().enumerate() {
+            // An odd number: the same tile of many rows is spread over all sets of the cache.
+            let tiles = keys.len().div_ceil(Self::TILE) | 1;
+            stride.push(tiles);
+            first.push(first[i] + tiles * Self::TILE * capacity);
         }
-        let cell = |joint: usize, entry: usize| first[joint] * Self::TILE + entry;
-        let rows = packing.start.iter();
-        let rows = rows.map(|&(joint, start)| cell(joint, start)).collect();
-        let observations = packing.keys.iter().enumerate();
-        let observations = observations.map(|(i, keys)| cell(i, keys.len() - 1));
-        let observations = observations.collect();
-        let drives = packing.drives.iter().enumerate();
-        let drives = drives.map(|(i, &start)| cell(i, start)).collect();
-        // An odd number of tiles: the same tile of many blocks is spread over all sets of the cache.
-        let stride = n_tiles | 1;
+        let links = packing.start.iter().copied();
+        let drives = packing.drives.iter().copied().enumerate();
+        let observations = packing.keys.iter().map(|keys| keys.len() - 1).enumerate();
+        let places: Vec<(usize, usize)> = links.chain(drives).chain(observations).collect();
+        let origin: Vec<usize> = places.iter().map(|&(i, entry)| first[i] + entry).collect();
         Self {
+            step: places
+                .iter()
+                .map(|&(i, _)| stride[i] * Self::TILE)
+                .collect(),
+            here: origin.clone(),
+            origin,
             plan,
             packing,
             lanes: LaneStates::new(n),
             kinematics: Kinematics::new(model, [F64x8::ZERO, F64x8::ONE]),
-            first,
-            rows,
-            drives,
-            observations,
             stride,
             capacity,
             n_blocks: 0,
-            cells: vec![F64x8::ZERO; stride * Self::TILE * capacity + ROOM],
+            cells: vec![F64x8::ZERO; first[n] + ROOM],
+            first,
         }
     }
 
@@ -102,7 +101,7 @@ impl RegressorTiles {
     ) -> usize {
         let (n, n_all) = (model.n_joints(), states.n_samples());
         assert_eq!(
-            (states.n_joints(), self.drives.len()),
+            (states.n_joints(), self.stride.len()),
             (n, n),
             "the states or the tiles have another number of joints than the model"
         );
@@ -112,63 +111,64 @@ impl RegressorTiles {
         let arch = pulp::Arch::new();
         let n_samples = (n_all - first).min(self.capacity * LANES);
         self.n_blocks = n_samples.div_ceil(LANES);
+        self.here.copy_from_slice(&self.origin);
         for block in 0..self.n_blocks {
-            let cells = &mut self.cells[block * self.stride * Self::TILE..];
             // The same block of the samples after these will be needed next.
-            let (here, next) = (
-                first + block * LANES,
-                first + (self.capacity + block) * LANES,
-            );
-            self.lanes.load_ahead(states, here, next);
+            let sample = first + block * LANES;
+            let next = sample + self.capacity * LANES;
+            self.lanes.load_ahead(states, sample, next);
+            let (links, others) = self.here.split_at(n * n);
+            let (drives, observations) = others.split_at(n);
             let fill = Fill::<_, TILES> {
                 model,
                 rows: Target {
                     plan: &self.plan,
-                    links: &self.rows,
-                    drives: &self.drives,
+                    links,
+                    drives,
                 },
                 state: self.lanes.state(),
                 kinematics: &mut self.kinematics,
-                cells,
+                cells: &mut self.cells,
             };
             fill.over_eight();
             if let Some(y) = observed {
-                scatter(arch, cells, &self.observations, (y, n_all), here);
+                scatter(arch, &mut self.cells, observations, (y, n_all), sample);
                 ask_for(arch, y, n_all, next);
-                continue;
+            } else {
+                for &cell in observations {
+                    self.cells[cell] = F64x8::ZERO;
+                }
             }
-            for &cell in &self.observations {
-                cells[cell] = F64x8::ZERO;
+            for (here, step) in self.here.iter_mut().zip(&self.step) {
+                *here += step;
             }
         }
         let rest = n_samples % LANES;
         if rest > 0 {
-            let block = self.stride * Self::TILE;
-            for cell in &mut self.cells[(self.n_blocks - 1) * block..][..block] {
-                cell.0[rest..].fill(0.0);
+            for (first, stride) in self.first.iter().zip(&self.stride) {
+                let row = stride * Self::TILE;
+                for cell in &mut self.cells[first + row * (self.n_blocks - 1)..][..row] {
+                    cell.0[rest..].fill(0.0);
+                }
             }
         }
         n_samples
     }
 
-    /// The tiles of the samples filled last, block after block of [`Self::stride`] tiles each.
-    pub fn blocks(&self) -> &[[F64x8; Self::TILE]] {
-        let cells = self.stride * Self::TILE * self.n_blocks;
-        self.cells[..cells].as_chunks().0
+    /// A joint's rows of the samples filled last: [`Self::stride`] tiles of the first eight samples, of the next eight, and
+    /// so on.
+    pub fn rows(&self, joint: usize) -> &[[F64x8; Self::TILE]] {
+        let cells = self.stride[joint] * Self::TILE * self.n_blocks;
+        self.cells[self.first[joint]..][..cells].as_chunks().0
     }
 
-    /// Tiles of a block.
-    pub fn stride(&self) -> usize {
-        self.stride
-    }
-
-    /// Where the tiles of a joint's row are in a block.
-    pub fn row(&self, joint: usize) -> Range<usize> {
-        self.first[joint]..self.first[joint + 1]
+    /// Tiles from one row of a joint to its next.
+    pub fn stride(&self, joint: usize) -> usize {
+        self.stride[joint]
     }
 
     /// Keys of the entries of a joint's row, rising: each entry of the regressor that can be other than zero has one, the
-    /// same in every row. The observation has the last key. Beyond them the row's last tile holds zeros.
+    /// same in every row. The observation has the last key. Beyond them the row holds zeros.
     pub fn keys(&self, joint: usize) -> &[usize] {
         &self.packing.keys[joint]
     }
@@ -214,8 +214,8 @@ mod tests {
                 let taken = tiles.fill(&model, &states, Some(&observed), first);
                 for joint in 0..n {
                     let keys = tiles.keys(joint);
-                    for block in tiles.blocks().chunks_exact(tiles.stride()) {
-                        let row = block[tiles.row(joint)].as_flattened();
+                    for row in tiles.rows(joint).chunks_exact(tiles.stride(joint)) {
+                        let row = row.as_flattened();
                         prop_assert!(row[keys.len()..].iter().all(|c| *c == F64x8::ZERO));
                         for (a, x) in keys.iter().zip(row) {
                             for (b, y) in keys.iter().zip(row) {
