@@ -155,7 +155,21 @@ mod tests {
                 "{a} {b}"
             );
         }
-        assert!((sigma / expected - 1.0).abs() <= HALF_THE_DIGITS);
+        // What the products lose of the residual: `n u / 2` over its share in the observations, squared (see
+        // `InformationFactor::from_products`).
+        let n_samples = p.states.n_samples();
+        let observed: f64 = p
+            .observed
+            .chunks_exact(n_samples)
+            .zip(weights)
+            .map(|(y, w)| w * y.iter().map(|y| y * y).sum::<f64>())
+            .sum();
+        let rest = 3 * n_samples - p.columns.len();
+        let share = expected.powi(2) * rest as f64 / observed;
+        let lost = p.columns.len() as f64 * f64::EPSILON / 4.0 / share;
+        assert!(lost < 1e-9, "the test would show little: {lost:e}");
+        let found = (sigma / expected - 1.0).abs();
+        assert!(found <= lost, "{found:e} beyond {lost:e}");
     }
 
     #[test]
