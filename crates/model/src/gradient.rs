@@ -9,6 +9,7 @@ use crate::axes::Kinematics;
 use crate::frame::LinkPose;
 use crate::kinematics::{LinkMotion, Screw, Travel, zero_motion, zero_screw};
 use crate::lane::{Kernel, Lane, read, zero};
+use crate::lane_states::{LaneStates, eight};
 use crate::model::Model;
 use crate::newton_euler::{link_wrench, splat_ten};
 use crate::packing::Rows;
@@ -16,7 +17,7 @@ use crate::parameter::{Columns, ParameterKind};
 use crate::plan::Plan;
 use crate::projection::BLOCKS;
 use crate::regressor::{Fill, RegressorBlock};
-use crate::states::{JointStates, LaneStates, eight};
+use crate::states::JointStates;
 use crate::wide::{F64x8, over_eight};
 use crate::wrench_map::WrenchMap;
 
@@ -152,11 +153,10 @@ fn over_lanes(
         lanes.load(states, first);
         contract(first, &lanes, &mut work);
         let here = first..n_samples.min(first + 8);
-        let count = here.len();
         for (j, bar) in work.out.iter().enumerate() {
-            gradient.q_mut(j)[here.clone()].copy_from_slice(&bar.q.0[..count]);
-            gradient.qd_mut(j)[here.clone()].copy_from_slice(&bar.qd.0[..count]);
-            gradient.qdd_mut(j)[here.clone()].copy_from_slice(&bar.qdd.0[..count]);
+            gradient.q_mut(j)[here.clone()].copy_from_slice(&bar.q.0[..here.len()]);
+            gradient.qd_mut(j)[here.clone()].copy_from_slice(&bar.qd.0[..here.len()]);
+            gradient.qdd_mut(j)[here.clone()].copy_from_slice(&bar.qdd.0[..here.len()]);
         }
     }
     gradient

@@ -243,7 +243,7 @@ proptest! {
         let model = Model::new(&robot);
         let n = robot.n_joints();
         let columns = Columns::standard(n, DriveColumns::ALL);
-        let mut states = crate::states::LaneStates::new(n);
+        let mut states = crate::lane_states::LaneStates::new(n);
         states.load(&JointStates::from_states(std::slice::from_ref(&state)), 0);
         let target = crate::packing::Rows::new(&model, &columns);
         let one = torque_regressor(&model, &columns, &state);

@@ -38,6 +38,7 @@ mod gradient_identities;
 mod identities;
 mod kinematics;
 mod lane;
+mod lane_states;
 mod model;
 mod newton_euler;
 mod packing;

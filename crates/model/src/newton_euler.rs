@@ -2,8 +2,9 @@
 
 use crate::kinematics::{LinkMotion, Screw, Travel, zero_motion, zero_screw};
 use crate::lane::{Kernel, Lane, V3, add, cross, dot, times};
+use crate::lane_states::LaneStates;
 use crate::model::Model;
-use crate::states::{JointState, JointStates, LaneStates};
+use crate::states::{JointState, JointStates};
 use crate::wide::{F64x8, over_eight, over_one};
 
 /// Joint torques of a motion, N·m (N for a prismatic joint).

@@ -2,11 +2,12 @@
 
 use crate::axes::Kinematics;
 use crate::lane::{Kernel, Lane};
+use crate::lane_states::LaneStates;
 use crate::model::Model;
 use crate::packing::{DenseRows, Rows, Target};
 use crate::parameter::Columns;
 use crate::projection::{BLOCKS, DENSE, fill};
-use crate::states::{JointState, JointStates, LaneStates};
+use crate::states::{JointState, JointStates};
 use crate::wide::{F64x8, over_eight, over_one};
 use nalgebra::DMatrix;
 

@@ -1,7 +1,6 @@
 //! Joint states: one, and many.
 
 use crate::robot::Robot;
-use crate::wide::F64x8;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -125,6 +124,11 @@ impl JointStates {
         &mut self.qdd[joint * self.n_samples..][..self.n_samples]
     }
 
+    /// Positions, velocities and accelerations, joints × samples each.
+    pub(crate) fn arrays(&self) -> [&[f64]; 3] {
+        [&self.q, &self.qd, &self.qdd]
+    }
+
     /// One sample.
     pub fn state(&self, sample: usize) -> JointState {
         let pick = |x: &[f64]| {
@@ -155,162 +159,6 @@ impl JointStates {
             qdd: pick(&self.qdd),
         }
     }
-}
-
-/// Eight samples of every joint, the last sample repeated where there are fewer.
-#[derive(Debug, Clone)]
-pub(crate) struct LaneStates {
-    q: Vec<F64x8>,
-    qd: Vec<F64x8>,
-    qdd: Vec<F64x8>,
-}
-
-impl LaneStates {
-    pub(crate) fn new(n_joints: usize) -> Self {
-        let zeros = vec![F64x8::ZERO; n_joints];
-        Self {
-            q: zeros.clone(),
-            qd: zeros.clone(),
-            qdd: zeros,
-        }
-    }
-
-    /// Positions, velocities and accelerations, one lane a joint.
-    pub(crate) fn state(&self) -> [&[F64x8]; 3] {
-        [&self.q, &self.qd, &self.qdd]
-    }
-
-    pub(crate) fn load(&mut self, states: &JointStates, first: usize) {
-        self.load_ahead(states, first, usize::MAX);
-    }
-
-    /// The same, and asks memory for the samples from `next` on, if there are any.
-    pub(crate) fn load_ahead(&mut self, states: &JointStates, first: usize, next: usize) {
-        let arch = pulp::Arch::new();
-        arch.dispatch(Load {
-            lanes: self,
-            states,
-            first,
-        });
-        if next >= states.n_samples {
-            return;
-        }
-        for all in [&states.q, &states.qd, &states.qdd] {
-            ask_for(arch, all, states.n_samples, next);
-        }
-    }
-}
-
-/// Has memory bring eight samples of all rows (rows × samples) near, without waiting for them.
-#[inline]
-pub(crate) fn ask_for(arch: pulp::Arch, all: &[f64], n_samples: usize, first: usize) {
-    if first >= n_samples {
-        return;
-    }
-    #[cfg(target_arch = "x86_64")]
-    {
-        // Into the second-level cache: it is not needed yet.
-        use std::arch::x86_64::_MM_HINT_T1;
-        let sse = match arch {
-            pulp::Arch::V4(simd) => simd.sse,
-            pulp::Arch::V3(simd) => simd.sse,
-            _ => return,
-        };
-        for x in all[first..].iter().step_by(n_samples) {
-            sse._mm_prefetch::<_MM_HINT_T1>(std::ptr::from_ref(x).cast());
-        }
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (arch, all);
-}
-
-/// Puts eight samples of every row (rows × samples) into the cell that is its own.
-pub(crate) fn scatter(
-    arch: pulp::Arch,
-    cells: &mut [F64x8],
-    places: &[usize],
-    (all, n_samples): (&[f64], usize),
-    first: usize,
-) {
-    arch.dispatch(Scatter {
-        cells,
-        places,
-        all,
-        n_samples,
-        first,
-    });
-}
-
-struct Scatter<'a> {
-    cells: &'a mut [F64x8],
-    places: &'a [usize],
-    all: &'a [f64],
-    n_samples: usize,
-    first: usize,
-}
-
-impl pulp::WithSimd for Scatter<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let rows = self.all.chunks_exact(self.n_samples);
-        for (&place, row) in self.places.iter().zip(rows) {
-            load(&mut self.cells[place], row, self.first);
-        }
-    }
-}
-
-/// Written with the registers the kernels read with: a wide read of narrow writes has to wait.
-struct Load<'a> {
-    lanes: &'a mut LaneStates,
-    states: &'a JointStates,
-    first: usize,
-}
-
-impl pulp::WithSimd for Load<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self {
-            lanes,
-            states,
-            first,
-        } = self;
-        load_all(&mut lanes.q, &states.q, states.n_samples, first);
-        load_all(&mut lanes.qd, &states.qd, states.n_samples, first);
-        load_all(&mut lanes.qdd, &states.qdd, states.n_samples, first);
-    }
-}
-
-#[inline(always)]
-fn load_all(lanes: &mut [F64x8], all: &[f64], n_samples: usize, first: usize) {
-    for (lane, row) in lanes.iter_mut().zip(all.chunks_exact(n_samples)) {
-        load(lane, row, first);
-    }
-}
-
-#[inline(always)]
-fn load(lane: &mut F64x8, row: &[f64], first: usize) {
-    if let Some(full) = row[first..].first_chunk::<8>() {
-        // By the slice: an array of its own would go by way of the stack.
-        lane.0.copy_from_slice(full);
-    } else {
-        *lane = eight(row, first);
-    }
-}
-
-/// Eight consecutive numbers, the last one repeated where there are fewer.
-#[inline(always)]
-pub(crate) fn eight(x: &[f64], first: usize) -> F64x8 {
-    let rest = &x[first..];
-    if let Some(full) = rest.first_chunk::<8>() {
-        return F64x8(*full);
-    }
-    let mut few = [rest[rest.len() - 1]; 8];
-    few[..rest.len()].copy_from_slice(rest);
-    F64x8(few)
 }
 
 /// Span of a prismatic joint (m) drawn from where the robot states no position limits.

@@ -1,13 +1,14 @@
 //! The torque regressor of many samples, laid out for products of its columns.
 
 use crate::axes::Kinematics;
+use crate::lane_states::{LaneStates, NextBlock};
 use crate::model::Model;
 use crate::packing::{Packing, ROOM, Target};
 use crate::parameter::Columns;
 use crate::plan::Plan;
 use crate::projection::TILES;
 use crate::regressor::Fill;
-use crate::states::{JointStates, LaneStates, ask_for, scatter};
+use crate::states::JointStates;
 use crate::wide::F64x8;
 
 /// Samples side by side in a block.
@@ -108,17 +109,24 @@ impl RegressorTiles {
         if let Some(y) = observed {
             assert_eq!(y.len(), n * n_all, "observations are not joints × samples");
         }
-        let arch = pulp::Arch::new();
         let n_samples = (n_all - first).min(self.capacity * LANES);
         self.n_blocks = n_samples.div_ceil(LANES);
         self.here.copy_from_slice(&self.origin);
         for block in 0..self.n_blocks {
-            // The same block of the samples after these will be needed next.
-            let sample = first + block * LANES;
-            let next = sample + self.capacity * LANES;
-            self.lanes.load_ahead(states, sample, next);
             let (links, others) = self.here.split_at(n * n);
             let (drives, observations) = others.split_at(n);
+            let sample = first + block * LANES;
+            NextBlock {
+                lanes: &mut self.lanes,
+                states,
+                observed,
+                places: observations,
+                cells: &mut self.cells,
+                first: sample,
+                // The same block of the samples after these.
+                soon: sample + self.capacity * LANES,
+            }
+            .load();
             let fill = Fill::<_, TILES> {
                 model,
                 rows: Target {
@@ -131,14 +139,6 @@ impl RegressorTiles {
                 cells: &mut self.cells,
             };
             fill.over_eight();
-            if let Some(y) = observed {
-                scatter(arch, &mut self.cells, observations, (y, n_all), sample);
-                ask_for(arch, y, n_all, next);
-            } else {
-                for &cell in observations {
-                    self.cells[cell] = F64x8::ZERO;
-                }
-            }
             for (here, step) in self.here.iter_mut().zip(&self.step) {
                 *here += step;
             }
