@@ -11,7 +11,7 @@ use idim_trajectory::{Certificate, FourierSeries, Limits};
 use std::sync::atomic::AtomicBool;
 
 /// A report looks at this many times the samples of a search: between them nothing is hidden from it.
-const REPORT_REFINEMENT: usize = 10;
+pub const REPORT_REFINEMENT: usize = 10;
 
 /// A motion inside all limits at every instant, and how good it is.
 #[derive(Debug, Clone, PartialEq)]

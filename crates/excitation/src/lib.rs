@@ -79,8 +79,9 @@ pub use condition::{ConditionNumber, ConditionRoute, condition_number, log_condi
 pub use criterion::{ConditionNumbers, Conditioning, Criterion, Equilibrium, Scaling};
 pub use error::Error;
 pub use fourier::{
-    FourierDesign, FourierProgress, FourierWatch, best_random_fourier, optimise_fourier,
-    optimise_fourier_watched, series_conditioning, states_conditioning, weighted_conditioning,
+    FourierDesign, FourierProgress, FourierWatch, REPORT_REFINEMENT, best_random_fourier,
+    optimise_fourier, optimise_fourier_watched, series_conditioning, states_conditioning,
+    weighted_conditioning,
 };
 pub use fourier_options::{FourierEnds, FourierOptions};
 pub use information::{information_matrix, information_with_observations};

@@ -227,15 +227,19 @@ fn search(
     }
 }
 
+/// Samples of a period that the criterion is lowered over.
+fn samples_of_search(options: &ExciteOptions) -> usize {
+    let typical = FourierOptions::default().n_samples;
+    typical.max(SAMPLES_PER_HARMONIC * options.n_harmonics)
+}
+
 fn fourier_options(options: &ExciteOptions) -> FourierOptions {
     let (first, criterion) = options.criteria[0];
     let further = options.criteria[1..].iter();
     FourierOptions {
         period: options.period,
         n_harmonics: options.n_harmonics,
-        n_samples: FourierOptions::default()
-            .n_samples
-            .max(SAMPLES_PER_HARMONIC * options.n_harmonics),
+        n_samples: samples_of_search(options),
         criterion,
         further: further.map(|&(w, c)| (w / first, c)).collect(),
         ends: if options.at_rest {

@@ -1,8 +1,8 @@
 //! `certificate.json`: what a motion uses of its limits, and every criterion; `docs/excite.md` explains it.
 
-use super::Excitation;
 use super::interrupt::Stopped;
-use super::text::{criterion_name, rounding_of_search};
+use super::text::{criterion_name, rounding_of_search, samples_of_report};
+use super::{Excitation, samples_of_search};
 use idim_excitation::{Conditioning, FourierDesign, TorqueCertificate};
 use idim_model::Robot;
 use idim_trajectory::{Certificate, LimitUse, Limits};
@@ -45,11 +45,13 @@ pub(super) fn certificate_json(robot: &Robot, found: &Excitation) -> Value {
             "evaluations": d.n_evaluations,
             "earlier_logs": found.n_logs,
             "log_choices": found.log_choices,
+            "samples": samples_of_search(o),
             "condition_by": "information matrix",
             "condition_rounding": rounding_of_search(found),
             "time_budget": o.time_budget,
             "reproducible": found.stopped == Stopped::No,
         },
+        "criteria_samples": samples_of_report(found),
         "criteria": criteria(&d.conditioning),
         "criteria_weighted": found.weighted.as_ref().map(|w| criteria(&w.0)),
         "criteria_random": found.random.as_ref().map(|r: &FourierDesign| criteria(&r.conditioning)),

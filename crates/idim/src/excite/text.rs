@@ -1,11 +1,12 @@
 //! What a person reads of a design.
 
-use super::Excitation;
 use super::arguments::CRITERIA;
 use super::interrupt::Stopped;
+use super::{Excitation, samples_of_search};
 use crate::table::{number, table};
 use idim_excitation::{
-    ClearanceCertificate, Conditioning, Criterion, FourierDesign, Scaling, TorqueCertificate,
+    ClearanceCertificate, Conditioning, Criterion, FourierDesign, REPORT_REFINEMENT, Scaling,
+    TorqueCertificate,
 };
 use idim_model::Robot;
 use idim_trajectory::{Certificate, JointUse, LimitUse};
@@ -145,9 +146,16 @@ fn route_text(found: &Excitation) -> String {
         ", too rough to search by: choose an equilibrated criterion, or wider limits"
     };
     format!(
-        "Cond in the table: by the singular values of the rows; in the search: by the eigenvalues of the information matrix, \
-         to {error:.0e} of its value{rough}"
+        "The table is over {} samples of the period, Cond by the singular values of the rows; the search over {}, by the \
+         eigenvalues of the information matrix, to {error:.0e} of its value{rough}",
+        samples_of_report(found),
+        samples_of_search(&found.options)
     )
+}
+
+/// Samples of a period that the criteria of a report are over.
+pub(super) fn samples_of_report(found: &Excitation) -> usize {
+    REPORT_REFINEMENT * samples_of_search(&found.options)
 }
 
 /// A search that cannot tell a percent of its criterion from rounding.
