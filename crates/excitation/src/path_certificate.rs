@@ -6,10 +6,12 @@
 use crate::torque_rate::{Magnitudes, TorqueRate};
 use crate::{Clearance, TorquePrior};
 use idim_model::{JointStates, Model};
-use idim_trajectory::{FourierSeries, LimitUse};
+use idim_trajectory::{FourierSeries, LimitUse, QuinticPath};
 
 /// Stretches a period is cut into at first, a harmonic.
 const STRETCHES: usize = 64;
+/// Stretches of a segment of a path.
+const STRETCHES_OF_SEGMENT: usize = 16;
 /// Middles looked at before a proof is given up: some seconds of work.
 const MOST_MIDDLES: usize = 1 << 21;
 /// Middles of one round, to keep what is held in memory small.
@@ -39,92 +41,170 @@ pub struct ClearanceCertificate {
     pub n_pairs: usize,
 }
 
-/// How fast the joints of a series move at most, at any time.
-struct Extremes {
-    position: Vec<f64>,
-    acceleration: Vec<f64>,
-    jerk: Vec<f64>,
+/// Largest magnitudes of a joint: position, acceleration, jerk.
+type Extremes = Vec<[f64; 3]>;
+
+/// A motion in pieces, each with the largest magnitudes its joints have there.
+pub(crate) struct Course<'a> {
+    motion: Motion<'a>,
+    extremes: Vec<Extremes>,
+    /// What a proof begins with.
+    stretches: Vec<Stretch>,
 }
 
-impl Extremes {
-    fn of(series: &FourierSeries) -> Self {
+enum Motion<'a> {
+    Series(&'a FourierSeries),
+    Path(&'a QuinticPath),
+}
+
+/// Part of a motion, within one piece of it.
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    piece: usize,
+    middle: f64,
+    half: f64,
+}
+
+/// Equal stretches from `start` on.
+fn cut(piece: usize, [start, end]: [f64; 2], n: usize) -> impl Iterator<Item = Stretch> {
+    let half = 0.5 * (end - start) / n as f64;
+    (0..n).map(move |k| Stretch {
+        piece,
+        middle: start + (2 * k + 1) as f64 * half,
+        half,
+    })
+}
+
+impl<'a> From<&'a FourierSeries> for Course<'a> {
+    fn from(series: &'a FourierSeries) -> Self {
         let sum = |j: usize, order: i32| -> f64 {
             let terms = series.a(j).iter().zip(series.b(j)).enumerate();
             terms
                 .map(|(l, (a, b))| (series.omega() * (l + 1) as f64).powi(order) * a.hypot(*b))
                 .sum()
         };
-        let n = 0..series.n_joints();
+        let of_joint = |j: usize| {
+            let position = series.mean_position()[j].abs() + sum(j, -1);
+            [position, sum(j, 1), sum(j, 2)]
+        };
+        let n = STRETCHES * series.n_harmonics();
         Self {
-            position: n
-                .clone()
-                .map(|j| series.mean_position()[j].abs() + sum(j, -1))
+            motion: Motion::Series(series),
+            extremes: vec![(0..series.n_joints()).map(of_joint).collect()],
+            stretches: cut(0, [0.0, series.period()], n).collect(),
+        }
+    }
+}
+
+impl<'a> From<&'a QuinticPath> for Course<'a> {
+    fn from(path: &'a QuinticPath) -> Self {
+        let times = path.point_times().windows(2).enumerate();
+        Self {
+            motion: Motion::Path(path),
+            extremes: (0..path.n_segments()).map(|i| path.magnitudes(i)).collect(),
+            stretches: times
+                .flat_map(|(i, t)| cut(i, [t[0], t[1]], STRETCHES_OF_SEGMENT))
                 .collect(),
-            acceleration: n.clone().map(|j| sum(j, 1)).collect(),
-            jerk: n.map(|j| sum(j, 2)).collect(),
         }
     }
 }
 
-/// Middles of stretches still to be proved, all of one length.
-fn middles(series: &FourierSeries) -> (Vec<f64>, f64) {
-    let n = STRETCHES * series.n_harmonics();
-    let half = 0.5 * series.period() / n as f64;
-    ((0..n).map(|k| (2 * k + 1) as f64 * half).collect(), half)
-}
+impl Course<'_> {
+    fn n_joints(&self) -> usize {
+        self.extremes[0].len()
+    }
 
-/// Halves what `excess` (by the states at the middles, their number and half a length) does not prove, until nothing is
-/// left: true; or until it says that something is wrong, or too much work.
-fn prove(
-    series: &FourierSeries,
-    mut open: impl FnMut(&JointStates, &[f64], f64) -> Option<Vec<bool>>,
-) -> bool {
-    let (mut times, mut half) = middles(series);
-    let mut n_middles = 0;
-    while !times.is_empty() {
-        n_middles += times.len();
-        if n_middles > MOST_MIDDLES {
-            return false;
+    fn states(&self, times: &[f64]) -> JointStates {
+        match self.motion {
+            Motion::Series(series) => series.states(times),
+            Motion::Path(path) => path.states(times),
         }
-        let mut next = Vec::new();
-        half *= 0.5;
-        for times in times.chunks(TOGETHER) {
-            let states = series.states(times);
-            let Some(open) = open(&states, times, 2.0 * half) else {
+    }
+
+    /// Halves what `open` (by the states at the middles) does not prove, until nothing is left: true; or until it says that
+    /// something is wrong, or too much work.
+    fn prove(&self, mut open: impl FnMut(&JointStates, &[Stretch]) -> Option<Vec<bool>>) -> bool {
+        let mut stretches = self.stretches.clone();
+        let mut n_middles = 0;
+        while !stretches.is_empty() {
+            n_middles += stretches.len();
+            if n_middles > MOST_MIDDLES {
                 return false;
-            };
-            for (t, _) in times.iter().zip(open).filter(|(_, open)| *open) {
-                next.extend([t - half, t + half]);
             }
+            let mut next = Vec::new();
+            for stretches in stretches.chunks(TOGETHER) {
+                let times: Vec<f64> = stretches.iter().map(|s| s.middle).collect();
+                let Some(open) = open(&self.states(&times), stretches) else {
+                    return false;
+                };
+                for (s, _) in stretches.iter().zip(open).filter(|(_, open)| *open) {
+                    let half = 0.5 * s.half;
+                    let at = |middle| Stretch { middle, half, ..*s };
+                    next.extend([at(s.middle - half), at(s.middle + half)]);
+                }
+            }
+            stretches = next;
         }
-        times = next;
+        true
     }
-    true
+}
+
+impl TorqueCertificate {
+    /// Of a path through points; `Err` where it uses too much: the largest excess found of each joint, as a fraction of
+    /// its limit.
+    ///
+    /// # Errors
+    /// No proof.
+    pub fn of_path(
+        model: &Model,
+        prior: &TorquePrior,
+        path: &QuinticPath,
+    ) -> Result<Self, Vec<f64>> {
+        certify_torque(model, prior, &path.into())
+    }
+}
+
+impl ClearanceCertificate {
+    /// Of a path through points; `Err` where something is too near: the distance that is missing, m.
+    ///
+    /// # Errors
+    /// No proof.
+    pub fn of_path(clearance: &Clearance, path: &QuinticPath) -> Result<Self, f64> {
+        certify_clearance(clearance, &path.into())
+    }
 }
 
 /// The certificate of a motion's torques; `Err` where it uses too much, with the largest excess found of each joint.
 pub(crate) fn certify_torque(
     model: &Model,
     prior: &TorquePrior,
-    series: &FourierSeries,
+    course: &Course<'_>,
 ) -> Result<TorqueCertificate, Vec<f64>> {
-    let n = series.n_joints();
-    let (extremes, rate) = (Extremes::of(series), TorqueRate::new(prior));
+    let n = course.n_joints();
+    let rate = TorqueRate::new(prior);
     let share = prior.share();
     let mut most = vec![(0.0_f64, 0.0); n];
     let mut bounds = vec![0.0_f64; n];
     let mut magnitudes: Vec<Magnitudes> = vec![[0.0; 4]; n];
-    let proved = prove(series, |states, times, half| {
+    let proved = course.prove(|states, stretches| {
         let torque = prior.smooth_torque(model, states);
-        let n_samples = times.len();
+        let n_samples = stretches.len();
         let mut open = vec![false; n_samples];
-        for k in 0..n_samples {
-            for j in 0..n {
+        for (
+            k,
+            &Stretch {
+                piece,
+                middle,
+                half,
+            },
+        ) in stretches.iter().enumerate()
+        {
+            for (j, [position, acceleration, jerk]) in course.extremes[piece].iter().enumerate() {
                 magnitudes[j] = [
-                    extremes.position[j],
-                    states.qd(j)[k].abs() + half * extremes.acceleration[j],
-                    states.qdd(j)[k].abs() + half * extremes.jerk[j],
-                    extremes.jerk[j],
+                    *position,
+                    states.qd(j)[k].abs() + half * acceleration,
+                    states.qdd(j)[k].abs() + half * jerk,
+                    *jerk,
                 ];
             }
             let rates = rate.bound(&magnitudes);
@@ -133,7 +213,7 @@ pub(crate) fn certify_torque(
                 let value = torque[j * n_samples + k];
                 let used = prior.used(j, value);
                 if used > most[j].0 {
-                    most[j] = (used, times[k]);
+                    most[j] = (used, middle);
                 }
                 let known = prior.known_change(j, states.q(j)[k], half * magnitudes[j][1]);
                 bound[j] = prior.used(j, value.abs() + half * rates[j] + known);
@@ -166,25 +246,34 @@ pub(crate) fn certify_torque(
 /// The certificate of a motion's distances; `Err` where something is too near, with the missing distance, m.
 pub(crate) fn certify_clearance(
     clearance: &Clearance,
-    series: &FourierSeries,
+    course: &Course<'_>,
 ) -> Result<ClearanceCertificate, f64> {
-    let extremes = Extremes::of(series);
-    let rates = clearance.rates(&extremes.position);
+    let position = |j: usize| {
+        let pieces = course.extremes.iter().map(|piece| piece[j][0]);
+        pieces.fold(0.0, f64::max)
+    };
+    let positions: Vec<f64> = (0..course.n_joints()).map(position).collect();
+    let rates = clearance.rates(&positions);
     let needed = clearance.smallest();
     let mut least = (0, f64::INFINITY, 0.0);
     let mut bound = f64::INFINITY;
-    let proved = prove(series, |states, times, half| {
-        let mut open = vec![false; times.len()];
-        for (k, open) in open.iter_mut().enumerate() {
+    let proved = course.prove(|states, stretches| {
+        let mut open = vec![false; stretches.len()];
+        for (k, (open, stretch)) in open.iter_mut().zip(stretches).enumerate() {
+            let &Stretch {
+                piece,
+                middle,
+                half,
+            } = stretch;
             let placed = clearance.place(&states.state(k).q);
             let mut here = f64::INFINITY;
             for (pair, rates) in rates.iter().enumerate() {
                 let distance = clearance.distance(&placed, pair);
                 if distance < least.1 {
-                    least = (pair, distance, times[k]);
+                    least = (pair, distance, middle);
                 }
                 let speed = |&(j, reach): &(usize, f64)| {
-                    reach * (states.qd(j)[k].abs() + half * extremes.acceleration[j])
+                    reach * (states.qd(j)[k].abs() + half * course.extremes[piece][j][1])
                 };
                 let change: f64 = rates.iter().map(speed).sum();
                 here = here.min(distance - half * change);

@@ -147,7 +147,7 @@ impl<'a> PathPenalty<'a> {
         let mut certificates = PathCertificates::default();
         let mut held = true;
         if let Some(prior) = self.torque {
-            match certify_torque(self.model, prior, series) {
+            match certify_torque(self.model, prior, &series.into()) {
                 Ok(c) => certificates.torque = Some(c),
                 Err(excess) => {
                     held = false;
@@ -163,7 +163,7 @@ impl<'a> PathPenalty<'a> {
             }
         }
         if let Some(clearance) = self.clearance {
-            match certify_clearance(clearance, series) {
+            match certify_clearance(clearance, &series.into()) {
                 Ok(c) => certificates.clearance = Some(c),
                 Err(missing) => {
                     held = false;

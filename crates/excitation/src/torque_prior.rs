@@ -176,7 +176,7 @@ impl TorquePrior {
 
     /// Fraction of a joint's limit that a torque without Coulomb friction uses at most; all of it and more where the torque
     /// is not a number.
-    pub(crate) fn used(&self, joint: usize, smooth_torque: f64) -> f64 {
+    pub fn used(&self, joint: usize, smooth_torque: f64) -> f64 {
         if smooth_torque.is_nan() {
             return f64::INFINITY;
         }

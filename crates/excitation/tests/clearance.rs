@@ -1,11 +1,14 @@
 //! Distances between the bodies of a robot: their gradient, their proof, and what is refused.
 #![allow(clippy::unwrap_used)]
 
-use idim_excitation::{Clearance, Error, FourierOptions, TorquePrior, optimise_fourier};
+use idim_excitation::{
+    Clearance, ClearanceCertificate, Error, FourierOptions, TorqueCertificate, TorquePrior,
+    optimise_fourier,
+};
 use idim_model::{
     Columns, JointState, JointStates, Model, Robot, inverse_dynamics, random_states, robot_from_ron,
 };
-use idim_trajectory::Limits;
+use idim_trajectory::{Limits, PathPoint, QuinticPath};
 
 /// An upright arm of two links between two posts.
 fn planar(posts: &str) -> Robot {
@@ -61,6 +64,72 @@ fn columns() -> Columns {
             .map(|(kind, index)| idim_model::Parameter { kind, index })
             .to_vec(),
     )
+}
+
+#[test]
+fn identity_a_path_through_points_is_proved_where_it_keeps_clear_and_within_torques() {
+    let robot = planar(POST);
+    let (model, limits) = (Model::new(&robot), Limits::from_robot(&robot).unwrap());
+    let inertial = robot.standard_parameters().unwrap();
+    let clearance = Clearance::new(&robot, 0.02).unwrap().unwrap();
+    let through = |points: &[[[f64; 2]; 2]], acceleration: f64| {
+        let point = |&[q, qd]: &[[f64; 2]; 2]| PathPoint {
+            q: q.to_vec(),
+            qd: qd.to_vec(),
+        };
+        let mut all = vec![PathPoint::at_rest(&[0.0, 0.0])];
+        all.extend(points.iter().map(point));
+        all.push(PathPoint::at_rest(&[0.0, 0.0]));
+        QuinticPath::shortest(&all, &limits.scaled(1.0, 1.0, acceleration)).unwrap()
+    };
+    // Samples of the path, a thousand a segment: what it uses of the torque limits, and its least distance.
+    let looked_at = |path: &QuinticPath| {
+        let n = 1000 * path.n_segments();
+        let times: Vec<f64> = (0..=n)
+            .map(|k| path.duration() * k as f64 / n as f64)
+            .collect();
+        let states = path.states(&times);
+        let mut used = [0.0_f64; 2];
+        for k in 0..=n {
+            let s = states.state(k);
+            let tau = inverse_dynamics(&model, &inertial, &s);
+            for (j, joint) in robot.joints().iter().enumerate() {
+                let friction = joint.actuator.viscous_friction.unwrap_or(0.0) * s.qd[j];
+                let coulomb = joint.actuator.coulomb_friction.unwrap_or(0.0);
+                let here = ((tau[j] + friction).abs() + coulomb) / joint.limits.torque.unwrap();
+                used[j] = used[j].max(here);
+            }
+        }
+        let nearest = clearance.nearest(&states);
+        (
+            used,
+            nearest.iter().map(|n| n.1).fold(f64::INFINITY, f64::min),
+        )
+    };
+    let calm = through(
+        &[[[-0.4, 0.6], [0.3, -0.5]], [[-0.9, -0.8], [-0.2, 0.4]]],
+        0.3,
+    );
+    let (used, least) = looked_at(&calm);
+    let share = 1.05 * used[0].max(used[1]);
+    let prior = TorquePrior::new(&robot, share).unwrap();
+    let torque = TorqueCertificate::of_path(&model, &prior, &calm).unwrap();
+    for (joint, used) in torque.joints.iter().zip(used) {
+        let bound = joint.unwrap().bound;
+        assert!(used <= bound && bound <= share, "{used} {bound} {share}");
+    }
+    let kept = ClearanceCertificate::of_path(&clearance, &calm).unwrap();
+    assert!(kept.bound >= 0.02 && least >= kept.bound && kept.distance <= least + 1e-3);
+    // A little less than it uses is refused, by as much as is missing.
+    let prior = TorquePrior::new(&robot, 0.9 * used[0].max(used[1])).unwrap();
+    let excess = TorqueCertificate::of_path(&model, &prior, &calm).unwrap_err();
+    assert!(excess.iter().any(|e| *e > 0.0));
+    // Straight through the post.
+    let blind = through(&[[[1.2, 0.3], [0.0, 0.0]]], 0.3);
+    let (_, least) = looked_at(&blind);
+    assert!(least < 0.0);
+    let missing = ClearanceCertificate::of_path(&clearance, &blind).unwrap_err();
+    assert!(missing > 0.0);
 }
 
 #[test]

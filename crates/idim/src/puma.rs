@@ -5,7 +5,7 @@ mod tables;
 
 use crate::cli::NamedText;
 use crate::error::Error;
-use crate::excite::points::path_through;
+use crate::excite::point_path::path_through;
 use crate::identify::{Prediction, errors, joint_names};
 use crate::noise_study::noise_study;
 use crate::papers::gautier_khalil;

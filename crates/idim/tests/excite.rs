@@ -383,7 +383,10 @@ fn identity_exciting_points_and_a_certified_path_through_them() {
     };
     refused(&["--harmonics", "3"], &["--harmonics", "points"]);
     refused(&["--log", "log.csv"], &["--log"]);
-    refused(&["--torque-share", "0.5"], &["--torque-share"]);
+    refused(
+        &["--torque-share", "0.5"],
+        &["no inertial values", "leave torques out"],
+    );
     refused(&["--rows", "5"], &["5", "6 base columns"]);
     refused(&["--criterion", "d,e"], &["by one", "--lambda"]);
     refused(&["--largest-s", "1"], &["limit of S"]);

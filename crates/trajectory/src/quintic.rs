@@ -180,6 +180,20 @@ impl QuinticPath {
         states
     }
 
+    /// Largest magnitudes of every joint on a segment: position, rad (m), acceleration, rad/s², and jerk, rad/s³.
+    ///
+    /// # Panics
+    /// If there is no such segment.
+    #[track_caller]
+    pub fn magnitudes(&self, segment: usize) -> Vec<[f64; 3]> {
+        let of_joint = |p: &Quintic| {
+            let [low, high] = p.position_extrema().map(|e| e.value.abs());
+            let acceleration = p.acceleration_extremum().value.abs();
+            [low.max(high), acceleration, p.largest_jerk()]
+        };
+        self.segments[segment].iter().map(of_joint).collect()
+    }
+
     /// Extrema of every joint over the whole path: roots of the derivatives, none missed.
     pub fn extrema(&self) -> Vec<JointExtrema> {
         let mut joints: Vec<JointExtrema> = Vec::with_capacity(self.n_joints());

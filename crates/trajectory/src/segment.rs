@@ -83,9 +83,24 @@ impl Quintic {
         let t = self.duration;
         // In w = u / T, all three terms of one size.
         let roots = quadratic_roots(a3, 4.0 * a4 * t, 10.0 * a5 * t * t);
-        let inside = roots.map(|w| if w > 0.0 && w < 1.0 { w * t } else { 0.0 });
-        let [low, high] = self.extremes(&inside, Self::qdd);
+        let [r0, r1] = roots.map(|w| if w > 0.0 && w < 1.0 { w * t } else { 0.0 });
+        let [low, high] = self.extremes(&[0.0, r0, r1, t], Self::qdd);
         larger(low, high)
+    }
+
+    /// Largest magnitude of the jerk `6 a3 + 24 a4 u + 60 a5 u²`.
+    pub(crate) fn largest_jerk(&self) -> f64 {
+        let [_, _, _, a3, a4, a5] = self.a;
+        let t = self.duration;
+        let jerk = |w: f64| {
+            (60.0 * a5 * t * t)
+                .mul_add(w, 24.0 * a4 * t)
+                .mul_add(w, 6.0 * a3)
+        };
+        let turn = -0.2 * a4 / (a5 * t);
+        let turn = if turn > 0.0 && turn < 1.0 { turn } else { 0.0 };
+        let all = [0.0, turn, 1.0].map(|w| jerk(w).abs());
+        all.into_iter().fold(0.0, f64::max)
     }
 
     /// Instant between two turns where the velocity changes sign; an end where it does not.

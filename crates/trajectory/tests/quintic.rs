@@ -7,6 +7,9 @@ use common::{config, grid, largest, limits, points};
 use idim_trajectory::{Error, Limits, PathPoint, QuinticPath};
 use proptest::prelude::*;
 
+/// Samples of a segment.
+const FINE: usize = 4000;
+
 /// Some thousand roundings of a polynomial of degree five.
 const ROUNDING: f64 = 1e-12;
 
@@ -51,6 +54,36 @@ proptest! {
             for j in 0..2 {
                 prop_assert!((x.q(j)[k] - point.q[j]).abs() <= 1e-11);
                 prop_assert!((x.qd(j)[k] - point.qd[j]).abs() <= 1e-10);
+            }
+        }
+    }
+
+    #[test]
+    fn identity_magnitudes_of_a_segment_are_reached_and_not_exceeded(
+        limits in limits(2), seed in 0..1000u64, durations in prop::collection::vec(0.1..5.0f64, 3),
+    ) {
+        let path = QuinticPath::through(&points(&limits, seed, 4), &durations).unwrap();
+        for (segment, (duration, joints)) in path.coefficients().iter().enumerate() {
+            for (a, stated) in joints.iter().zip(path.magnitudes(segment)) {
+                let mut most = [0.0_f64; 3];
+                for k in 0..=FINE {
+                    let u = duration * k as f64 / FINE as f64;
+                    let sum = |c: [f64; 6], down: i32| -> f64 {
+                        (down..6).map(|i| c[i as usize] * a[i as usize] * u.powi(i - down)).sum()
+                    };
+                    let here = [
+                        sum([1.0; 6], 0),
+                        sum([0.0, 0.0, 2.0, 6.0, 12.0, 20.0], 2),
+                        sum([0.0, 0.0, 0.0, 6.0, 24.0, 60.0], 3),
+                    ];
+                    for (most, x) in most.iter_mut().zip(here) {
+                        *most = most.max(x.abs());
+                    }
+                }
+                for (found, stated) in most.into_iter().zip(stated) {
+                    // Between samples a turn is missed by the square of their distance at most.
+                    prop_assert!(found <= stated * (1.0 + 1e-9) && stated <= found * (1.0 + 1e-5) + 1e-9, "{found} {stated}");
+                }
             }
         }
     }

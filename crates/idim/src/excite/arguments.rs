@@ -276,6 +276,7 @@ fn run_points(
     (progress, watch): (&Progress, &Watch),
     out: &mut dyn Write,
 ) -> Result<(), Error> {
+    let conditions = conditions(robot, args.torque_share, args.clearance, &args.may_touch)?;
     let restrained = args.largest_s.is_some() || args.lambda.is_some();
     let rounds = match (args.time_budget, restrained) {
         (None, _) => POINT_ROUNDS[0],
@@ -298,19 +299,21 @@ fn run_points(
         }),
         n_rounds: args.rounds.unwrap_or(rounds),
         seed: args.seed,
+        torque: conditions.torque,
+        clearance: conditions.clearance,
     };
     let found = excite_points(robot, limits, options, progress, watch)?;
     let files = files(
         robot,
-        &Motion::Quintic(found.path.clone()),
-        found.path.duration(),
+        &Motion::Quintic(found.proved.path.clone()),
+        found.proved.path.duration(),
         (args.rate, args.seed),
         &points_json(robot, limits, &found),
-        plots::of_path(robot, &found.path, limits).remove(0),
+        plots::of_path(robot, &found.proved.path, limits).remove(0),
     );
     progress.finish();
     let mut notes = robot.notes().to_vec();
-    notes.push("torques and collisions of a path through points are not looked at".into());
+    notes.extend(conditions.notes);
     say(out, &(points_text(robot, &found) + &warnings_text(&notes)))?;
     write(&args.out, robot, &files, out)
 }
@@ -323,12 +326,6 @@ fn check_family(args: &ExciteArgs) -> Result<(), Error> {
         ("--rest", args.rest),
         ("--columns", args.columns.is_some()),
         ("--noise", !args.noise.is_empty()),
-        (
-            "--torque-share",
-            args.torque_share.is_some_and(|s| s != 0.0),
-        ),
-        ("--clearance", args.clearance.is_some()),
-        ("--may-touch", !args.may_touch.is_empty()),
         ("--log", !args.log.is_empty()),
     ];
     let of_points = [

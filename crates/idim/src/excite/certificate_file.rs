@@ -3,7 +3,7 @@
 use super::interrupt::Stopped;
 use super::text::{criterion_name, rounding_of_search, samples_of_report};
 use super::{Excitation, samples_of_search};
-use idim_excitation::{Conditioning, FourierDesign, TorqueCertificate};
+use idim_excitation::{ClearanceCertificate, Conditioning, FourierDesign, TorqueCertificate};
 use idim_model::Robot;
 use idim_trajectory::{Certificate, LimitUse, Limits};
 use serde_json::{Value, json};
@@ -26,13 +26,7 @@ pub(super) fn certificate_json(robot: &Robot, found: &Excitation) -> Value {
         "largest_use": largest_json(robot, &d.certificate),
         "joints": joints_json(robot, &found.limits, &d.certificate, d.torque.as_ref()),
         "torque_share": d.torque.as_ref().map(|t| t.share),
-        "clearance": d.clearance.as_ref().map(|c| json!({
-            "distance": c.distance,
-            "bound": c.bound,
-            "time": c.time,
-            "links": c.links,
-            "pairs": c.n_pairs,
-        })),
+        "clearance": clearance_json(d.clearance.as_ref()),
         "search": {
             "criterion": criterion_name(found),
             "value": found.value(),
@@ -55,6 +49,19 @@ pub(super) fn certificate_json(robot: &Robot, found: &Excitation) -> Value {
         "criteria": criteria(&d.conditioning),
         "criteria_weighted": found.weighted.as_ref().map(|w| criteria(&w.0)),
         "criteria_random": found.random.as_ref().map(|r: &FourierDesign| criteria(&r.conditioning)),
+    })
+}
+
+/// The smallest distance.
+pub(super) fn clearance_json(clearance: Option<&ClearanceCertificate>) -> Option<Value> {
+    clearance.map(|c| {
+        json!({
+            "distance": c.distance,
+            "bound": c.bound,
+            "time": c.time,
+            "links": c.links,
+            "pairs": c.n_pairs,
+        })
     })
 }
 

@@ -1,17 +1,18 @@
 //! Exciting points of the energy model and the path through them, as Gautier & Khalil 1991 have it, for any robot.
 
 use super::interrupt::{Stopped, Watch};
+use super::point_path::{Guard, Outcome, Proved, slower};
 use super::{N_RANDOM, RANDOM_SHARE};
 use crate::columns::ExtraColumn;
 use crate::error::Error;
 use crate::progress::Progress;
 use crate::structure::{KeepOrder, Structure};
 use idim_excitation::{
-    Conditioning, Criterion, EnergyDesign, PointDesign, PointLimits, PointSearchOptions,
-    search_points, states_conditioning,
+    Clearance, Conditioning, Criterion, EnergyDesign, PointDesign, PointLimits, PointSearchOptions,
+    TorquePrior, search_points, states_conditioning,
 };
-use idim_model::{Columns, DriveColumns, JointStates, Model, Robot};
-use idim_trajectory::{Certificate, Limits, PathPoint, QuinticPath};
+use idim_model::{Columns, DriveColumns, Model, Robot};
+use idim_trajectory::{Limits, QuinticPath};
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 use std::ops::ControlFlow;
 
@@ -20,8 +21,11 @@ const POINT_SPEED: f64 = 0.9;
 /// Where the path leaves its limits, points are searched again under smaller ones (the paper's remedy): as much smaller as it
 /// left them, and by this.
 const SPARE: f64 = 0.97;
-/// Searches at most: two or three are needed.
-const ATTEMPTS: usize = 8;
+/// Where something comes too near, or a motor cannot hold a weight, points are searched again so much nearer to the middle of
+/// their ranges.
+const NEARER_HOME: f64 = 0.9;
+/// Searches at most: two or three are needed, more where something may meet.
+const ATTEMPTS: usize = 20;
 /// A point whose path leaves its limits is slowed down by this; so many times at most, after which it stands still.
 const SLOWER: f64 = 0.85;
 const SLOWINGS: usize = 200;
@@ -31,7 +35,7 @@ const SEARCH_SHARE: f64 = 0.3;
 const SAMPLES: usize = 20;
 
 /// What points are asked to be.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct PointOptions {
     pub(super) criterion: Criterion,
     /// Energy differences; twice the base parameters where not said, as the paper.
@@ -40,6 +44,9 @@ pub(super) struct PointOptions {
     pub(super) n_starts: usize,
     pub(super) n_rounds: usize,
     pub(super) seed: u64,
+    /// Torque limits and distances that the path keeps.
+    pub(super) torque: Option<TorquePrior>,
+    pub(super) clearance: Option<Clearance>,
 }
 
 /// Points with everything that is said of them.
@@ -49,8 +56,7 @@ pub(super) struct PointExcitation {
     pub(super) structure: Structure,
     pub(super) points: PointDesign,
     /// From rest through the points to rest, inside all limits.
-    pub(super) path: QuinticPath,
-    pub(super) certificate: Certificate,
+    pub(super) proved: Proved,
     /// Searches that were made, each under smaller limits than the one before.
     pub(super) attempts: usize,
     /// Whether points were slowed down until the path kept its limits, since there was no time for another search.
@@ -122,8 +128,9 @@ pub(super) fn excite_points(
         progress.stage(format!("{N_RANDOM} random chains of {n_rows} rows"));
     }
     let (random, n_random) = best_random(&first, n_rows, &options, watch);
+    let mut guard = Guard::new(robot, limits, &options)?;
     let (mut attempts, mut slowed_down, mut cut_short) = (0, false, false);
-    let (points, path, certificate) = loop {
+    let (points, proved) = loop {
         attempts += 1;
         let design = EnergyDesign::new(robot, &columns, inside.clone())?;
         let (enough, before) = (watch.enough(SEARCH_SHARE), watch.left());
@@ -139,25 +146,37 @@ pub(super) fn excite_points(
                 ControlFlow::Continue(())
             }
         })?;
-        let path = path_through(&points.points, &home(limits), limits)?;
-        let certificate = path.certificate(limits);
-        if certificate.certified {
-            break (points, path, certificate);
+        progress.stage("proving the path");
+        let outcome = guard.prove(&points.points)?;
+        if let Outcome::Proved(proved) = outcome {
+            break (points, proved);
         }
         // Another search takes as long as this one.
         let no_time = before.zip(watch.left()).is_some_and(|(b, a)| a <= b - a);
         if attempts == ATTEMPTS || no_time || watch.check().is_err() {
             slowed_down = true;
-            break slowed(&design, points, path, limits)?;
+            break slowed(&design, points, &mut guard)?;
         }
-        let shares = shares(&path.largest_overshoot(limits), limits);
-        for (j, share) in shares.into_iter().enumerate() {
-            let [low, high] = inside.position[j];
-            let (centre, half) = (f64::midpoint(low, high), 0.5 * share * (high - low));
-            inside.position[j] = [centre - half, centre + half];
+        match outcome {
+            Outcome::Proved(_) => {}
+            Outcome::Leaves(path) => {
+                let shares = shares(&path.largest_overshoot(limits), limits);
+                for (position, share) in inside.position.iter_mut().zip(shares) {
+                    *position = shrunk(*position, share);
+                }
+            }
+            Outcome::TooFast(clock) => {
+                guard.clock *= clock;
+                inside.velocity.iter_mut().for_each(|v| *v *= clock);
+            }
+            Outcome::TooWide(_) => {
+                for position in &mut inside.position {
+                    *position = shrunk(*position, NEARER_HOME);
+                }
+            }
         }
     };
-    let along = along(robot, &path)?;
+    let along = along(robot, &proved.path)?;
     let stopped = match watch.check() {
         Err(_) => Stopped::Interrupted,
         Ok(()) if cut_short || n_random < N_RANDOM => Stopped::OutOfTime,
@@ -170,8 +189,7 @@ pub(super) fn excite_points(
         },
         structure,
         points,
-        path,
-        certificate,
+        proved,
         attempts,
         slowed_down,
         random,
@@ -227,26 +245,6 @@ fn best_random(
     (best, tried.len())
 }
 
-/// Where a path begins and ends: amid the position limits.
-fn home(limits: &Limits) -> Vec<f64> {
-    (0..limits.n_joints()).map(|j| limits.centre(j)).collect()
-}
-
-/// The shortest path from rest at home through the points and back to rest there.
-pub(crate) fn path_through(
-    points: &JointStates,
-    home: &[f64],
-    limits: &Limits,
-) -> Result<QuinticPath, Error> {
-    let mut all = vec![PathPoint::at_rest(home)];
-    all.extend((0..points.n_samples()).map(|k| {
-        let s = points.state(k);
-        PathPoint { q: s.q, qd: s.qd }
-    }));
-    all.push(PathPoint::at_rest(home));
-    Ok(QuinticPath::shortest(&all, limits)?)
-}
-
 /// By how much less of its position limits each joint's points may use: as if a path grew with its points, and a little more.
 fn shares(overshoot: &[f64], limits: &Limits) -> Vec<f64> {
     let share = |(j, over): (usize, &f64)| {
@@ -260,41 +258,57 @@ fn shares(overshoot: &[f64], limits: &Limits) -> Vec<f64> {
     overshoot.iter().enumerate().map(share).collect()
 }
 
+/// A range about its middle, times a share.
+fn shrunk([low, high]: [f64; 2], share: f64) -> [f64; 2] {
+    let (centre, half) = (f64::midpoint(low, high), 0.5 * share * (high - low));
+    [centre - half, centre + half]
+}
+
 /// The points slowed down where the path beside them leaves its limits, until it does not: between points at rest inside the
 /// limits a path stays inside.
 fn slowed(
     design: &EnergyDesign,
     mut found: PointDesign,
-    mut path: QuinticPath,
-    limits: &Limits,
-) -> Result<(PointDesign, QuinticPath, Certificate), Error> {
+    guard: &mut Guard<'_>,
+) -> Result<(PointDesign, Proved), Error> {
     let n_points = found.points.n_samples();
+    let mut why = "stays inside the limits";
     for _ in 0..SLOWINGS {
-        let mut slower = vec![vec![false; n_points]; limits.n_joints()];
-        for o in path.overshoot(limits) {
+        let path = match guard.prove(&found.points)? {
+            Outcome::Proved(proved) => {
+                found.conditioning = design.conditioning(&found.points);
+                return Ok((found, proved));
+            }
+            Outcome::Leaves(path) => path,
+            Outcome::TooFast(clock) => {
+                guard.clock *= clock;
+                found.points = slower(&found.points, clock);
+                continue;
+            }
+            Outcome::TooWide(kept) => {
+                why = kept;
+                break;
+            }
+        };
+        let mut beside_it = vec![vec![false; n_points]; guard.limits.n_joints()];
+        for o in path.overshoot(guard.limits) {
             // The path begins at home, before the first point.
             let beside = [o.segment.checked_sub(1), Some(o.segment)];
             for k in beside.into_iter().flatten().filter(|k| *k < n_points) {
-                slower[o.joint][k] = true;
+                beside_it[o.joint][k] = true;
             }
         }
-        for (j, slower) in slower.iter().enumerate() {
-            let speeds = found.points.qd_mut(j).iter_mut().zip(slower);
-            for (qd, _) in speeds.filter(|(_, slower)| **slower) {
+        for (j, beside_it) in beside_it.iter().enumerate() {
+            let speeds = found.points.qd_mut(j).iter_mut().zip(beside_it);
+            for (qd, _) in speeds.filter(|(_, beside_it)| **beside_it) {
                 *qd *= SLOWER;
             }
-        }
-        path = path_through(&found.points, &home(limits), limits)?;
-        let certificate = path.certificate(limits);
-        if certificate.certified {
-            found.conditioning = design.conditioning(&found.points);
-            return Ok((found, path, certificate));
         }
     }
     Err(Error::input(
         "--family points",
-        "no path through exciting points stays inside the limits",
-        "nothing is written; give wider limits, or take the Fourier motion",
+        format!("no path through exciting points was found that {why}"),
+        "nothing is written; give other position limits, more time, or take the Fourier motion",
     ))
 }
 

@@ -1,6 +1,6 @@
 //! What a person and other programs read of exciting points.
 
-use super::certificate_file::{SCHEMA, criteria, joints_json, largest_json};
+use super::certificate_file::{SCHEMA, clearance_json, criteria, joints_json, largest_json};
 use super::interrupt::Stopped;
 use super::points::PointExcitation;
 use super::text::{criteria_table, limits_text, term_name};
@@ -18,7 +18,7 @@ pub(super) fn points_text(robot: &Robot, found: &PointExcitation) -> String {
         robot.name(),
         p.points.n_samples(),
         found.structure.reduction.rank(),
-        number(found.path.duration()),
+        number(found.proved.path.duration()),
     );
     let _ = writeln!(
         out,
@@ -35,7 +35,7 @@ pub(super) fn points_text(robot: &Robot, found: &PointExcitation) -> String {
         }
     );
     if found.attempts > 1 {
-        out += "points searched again under smaller limits where the path left its own\n";
+        out += "points searched again under smaller limits where the path did not keep its own\n";
     }
     if found.slowed_down {
         out += "points slowed down where the path left its limits, for want of time: a longer search finds better ones\n";
@@ -67,7 +67,13 @@ pub(super) fn points_text(robot: &Robot, found: &PointExcitation) -> String {
         "\nCriteria of the torques along the path, for the columns of `identify`\n{}",
         criteria_table(&found.along, None)
     );
-    out + &limits_text(robot, &found.certificate, None, None)
+    let proved = &found.proved;
+    out + &limits_text(
+        robot,
+        &proved.certificate,
+        proved.torque.as_ref(),
+        proved.clearance.as_ref(),
+    )
 }
 
 pub(super) fn points_json(robot: &Robot, limits: &Limits, found: &PointExcitation) -> Value {
@@ -77,12 +83,14 @@ pub(super) fn points_json(robot: &Robot, limits: &Limits, found: &PointExcitatio
         "version": env!("CARGO_PKG_VERSION"),
         "robot": robot.name(),
         "family": "points",
-        "duration": found.path.duration(),
+        "duration": found.proved.path.duration(),
         "rows": o.n_rows,
         "base_parameters": found.structure.base_names(),
-        "certified": found.certificate.certified,
-        "largest_use": largest_json(robot, &found.certificate),
-        "joints": joints_json(robot, limits, &found.certificate, None),
+        "certified": found.proved.certificate.certified,
+        "largest_use": largest_json(robot, &found.proved.certificate),
+        "joints": joints_json(robot, limits, &found.proved.certificate, found.proved.torque.as_ref()),
+        "torque_share": found.proved.torque.as_ref().map(|t| t.share),
+        "clearance": clearance_json(found.proved.clearance.as_ref()),
         "search": {
             "criterion": term_name(o.criterion),
             "value": found.value(),
