@@ -1,7 +1,7 @@
 //! Exciting points of the energy model and the path through them, as Gautier & Khalil 1991 have it, for any robot.
 
 use super::interrupt::{Stopped, Watch};
-use super::point_path::{Guard, Outcome, Proved, slower};
+use super::point_path::{Guard, Outcome, Proved, home, slower};
 use super::{N_RANDOM, RANDOM_SHARE};
 use crate::columns::ExtraColumn;
 use crate::error::Error;
@@ -11,7 +11,7 @@ use idim_excitation::{
     Clearance, Conditioning, Criterion, EnergyDesign, PointDesign, PointLimits, PointSearchOptions,
     TorquePrior, search_points, states_conditioning,
 };
-use idim_model::{Columns, DriveColumns, Model, Robot};
+use idim_model::{Columns, DriveColumns, JointStates, Model, Robot};
 use idim_trajectory::{Limits, QuinticPath};
 use rayon::prelude::{IntoParallelIterator, ParallelIterator};
 use std::ops::ControlFlow;
@@ -29,8 +29,10 @@ const ATTEMPTS: usize = 20;
 /// A point whose path leaves its limits is slowed down by this; so many times at most, after which it stands still.
 const SLOWER: f64 = 0.85;
 const SLOWINGS: usize = 200;
-/// Share of the time left that one search may take: another may be needed, and the end of each takes its time.
+/// Share of the time left that one search may take: another may be needed, more where something may meet, and the end of each
+/// takes its time.
 const SEARCH_SHARE: f64 = 0.3;
+const SEARCH_SHARE_CLEAR: f64 = 0.12;
 /// Samples the torque rows of a path are looked at by, a segment.
 const SAMPLES: usize = 20;
 
@@ -59,7 +61,7 @@ pub(super) struct PointExcitation {
     pub(super) proved: Proved,
     /// Searches that were made, each under smaller limits than the one before.
     pub(super) attempts: usize,
-    /// Whether points were slowed down until the path kept its limits, since there was no time for another search.
+    /// Whether points were slowed down or drawn in until the path kept its limits, since there was no time for another search.
     pub(super) slowed_down: bool,
     /// Best of the random chains, and how many there were.
     pub(super) random: Option<(f64, Conditioning)>,
@@ -129,11 +131,15 @@ pub(super) fn excite_points(
     }
     let (random, n_random) = best_random(&first, n_rows, &options, watch);
     let mut guard = Guard::new(robot, limits, &options)?;
+    let share = match options.clearance {
+        None => SEARCH_SHARE,
+        Some(_) => SEARCH_SHARE_CLEAR,
+    };
     let (mut attempts, mut slowed_down, mut cut_short) = (0, false, false);
     let (points, proved) = loop {
         attempts += 1;
         let design = EnergyDesign::new(robot, &columns, inside.clone())?;
-        let (enough, before) = (watch.enough(SEARCH_SHARE), watch.left());
+        let (enough, before) = (watch.enough(share), watch.left());
         let points = search_points(&design, &search, &mut |p| {
             progress.stage(format!(
                 "search {attempts}: round {} of {}, best {:.5}; Ctrl-C takes it",
@@ -157,24 +163,7 @@ pub(super) fn excite_points(
             slowed_down = true;
             break slowed(&design, points, &mut guard)?;
         }
-        match outcome {
-            Outcome::Proved(_) => {}
-            Outcome::Leaves(path) => {
-                let shares = shares(&path.largest_overshoot(limits), limits);
-                for (position, share) in inside.position.iter_mut().zip(shares) {
-                    *position = shrunk(*position, share);
-                }
-            }
-            Outcome::TooFast(clock) => {
-                guard.clock *= clock;
-                inside.velocity.iter_mut().for_each(|v| *v *= clock);
-            }
-            Outcome::TooWide(_) => {
-                for position in &mut inside.position {
-                    *position = shrunk(*position, NEARER_HOME);
-                }
-            }
-        }
+        narrow(&mut inside, outcome, &mut guard);
     };
     let along = along(robot, &proved.path)?;
     let stopped = match watch.check() {
@@ -197,6 +186,28 @@ pub(super) fn excite_points(
         along,
         stopped,
     })
+}
+
+/// Smaller limits of points for the next search, by what became of the path through these.
+fn narrow(inside: &mut PointLimits, outcome: Outcome, guard: &mut Guard<'_>) {
+    match outcome {
+        Outcome::Proved(_) => {}
+        Outcome::Leaves(path) => {
+            let shares = shares(&path.largest_overshoot(guard.limits), guard.limits);
+            for (position, share) in inside.position.iter_mut().zip(shares) {
+                *position = shrunk(*position, share);
+            }
+        }
+        Outcome::TooFast(clock) => {
+            guard.clock *= clock;
+            inside.velocity.iter_mut().for_each(|v| *v *= clock);
+        }
+        Outcome::TooWide(_) => {
+            for position in &mut inside.position {
+                *position = shrunk(*position, NEARER_HOME);
+            }
+        }
+    }
 }
 
 /// Limits of points: room enough to stop from most of their speed, if that leaves half of the range.
@@ -264,8 +275,20 @@ fn shrunk([low, high]: [f64; 2], share: f64) -> [f64; 2] {
     [centre - half, centre + half]
 }
 
-/// The points slowed down where the path beside them leaves its limits, until it does not: between points at rest inside the
-/// limits a path stays inside.
+/// The points nearer to where the path begins, and as much slower: the path grows with them.
+fn draw_in(points: &mut JointStates, limits: &Limits) {
+    for (j, home) in home(limits).into_iter().enumerate() {
+        for q in points.q_mut(j) {
+            *q = home + NEARER_HOME * (*q - home);
+        }
+        for qd in points.qd_mut(j) {
+            *qd *= NEARER_HOME;
+        }
+    }
+}
+
+/// The points slowed down where the path beside them leaves its limits, until it does not, and drawn in while something is too
+/// near: between points at rest inside the limits a path stays inside, and where it begins nothing is near.
 fn slowed(
     design: &EnergyDesign,
     mut found: PointDesign,
@@ -287,7 +310,8 @@ fn slowed(
             }
             Outcome::TooWide(kept) => {
                 why = kept;
-                break;
+                draw_in(&mut found.points, guard.limits);
+                continue;
             }
         };
         let mut beside_it = vec![vec![false; n_points]; guard.limits.n_joints()];

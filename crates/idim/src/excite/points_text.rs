@@ -38,7 +38,7 @@ pub(super) fn points_text(robot: &Robot, found: &PointExcitation) -> String {
         out += "points searched again under smaller limits where the path did not keep its own\n";
     }
     if found.slowed_down {
-        out += "points slowed down where the path left its limits, for want of time: a longer search finds better ones\n";
+        out += "points slowed down or drawn in where the path did not keep its limits, for want of time: a longer search finds better ones\n";
     }
     let _ = writeln!(
         out,
