@@ -127,6 +127,13 @@ fn identity_paths_through_points_keep_torques_and_distances() {
     assert!(least >= bound && bound >= 0.02, "{least}, {bound}");
     assert_eq!(certificate["torque_share"], 0.8);
     assert!(certificate["certified"].as_bool().unwrap());
+    // Without time for more than one search the points are drawn in until the path keeps all of it.
+    points(&folder, &text, &["--time-budget", "0.05"]).unwrap();
+    let (used, least) = looked_at();
+    assert!(
+        used[0].max(used[1]) <= 0.8 && least >= 0.02,
+        "{used:?} {least}"
+    );
 }
 
 #[test]
