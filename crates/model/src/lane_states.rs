@@ -138,10 +138,9 @@ impl Memory {
     fn ask_for(self, all: &[f64], step: usize) {
         #[cfg(target_arch = "x86_64")]
         if let Some(sse) = self.sse {
-            // Into the second-level cache: it is not needed yet.
-            use std::arch::x86_64::_MM_HINT_T1;
+            use std::arch::x86_64::_MM_HINT_T0;
             for x in all.iter().step_by(step) {
-                sse._mm_prefetch::<_MM_HINT_T1>(std::ptr::from_ref(x).cast());
+                sse._mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(x).cast());
             }
         }
         #[cfg(not(target_arch = "x86_64"))]

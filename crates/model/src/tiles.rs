@@ -13,6 +13,8 @@ use crate::wide::F64x8;
 
 /// Samples side by side in a block.
 const LANES: usize = 8;
+/// Blocks that memory is asked ahead for: longer than it takes to answer, and still in the first-level cache when needed.
+const AHEAD: usize = 2;
 
 /// The torque regressor of some hundred samples, without what is always zero, in tiles of four entries.
 ///
@@ -123,8 +125,7 @@ impl RegressorTiles {
                 places: observations,
                 cells: &mut self.cells,
                 first: sample,
-                // The same block of the samples after these.
-                soon: sample + self.capacity * LANES,
+                soon: sample + AHEAD * LANES,
             }
             .load();
             let fill = Fill::<_, TILES> {
