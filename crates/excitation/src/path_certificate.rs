@@ -44,17 +44,15 @@ pub struct ClearanceCertificate {
 /// Largest magnitudes of a joint: position, acceleration, jerk.
 type Extremes = Vec<[f64; 3]>;
 
+/// The states of a motion at given times.
+type States<'a> = Box<dyn Fn(&[f64]) -> JointStates + 'a>;
+
 /// A motion in pieces, each with the largest magnitudes its joints have there.
 pub(crate) struct Course<'a> {
-    motion: Motion<'a>,
+    states: States<'a>,
     extremes: Vec<Extremes>,
     /// What a proof begins with.
     stretches: Vec<Stretch>,
-}
-
-enum Motion<'a> {
-    Series(&'a FourierSeries),
-    Path(&'a QuinticPath),
 }
 
 /// Part of a motion, within one piece of it.
@@ -89,7 +87,7 @@ impl<'a> From<&'a FourierSeries> for Course<'a> {
         };
         let n = STRETCHES * series.n_harmonics();
         Self {
-            motion: Motion::Series(series),
+            states: Box::new(|times| series.states(times)),
             extremes: vec![(0..series.n_joints()).map(of_joint).collect()],
             stretches: cut(0, [0.0, series.period()], n).collect(),
         }
@@ -100,7 +98,7 @@ impl<'a> From<&'a QuinticPath> for Course<'a> {
     fn from(path: &'a QuinticPath) -> Self {
         let times = path.point_times().windows(2).enumerate();
         Self {
-            motion: Motion::Path(path),
+            states: Box::new(|times| path.states(times)),
             extremes: (0..path.n_segments()).map(|i| path.magnitudes(i)).collect(),
             stretches: times
                 .flat_map(|(i, t)| cut(i, [t[0], t[1]], STRETCHES_OF_SEGMENT))
@@ -112,13 +110,6 @@ impl<'a> From<&'a QuinticPath> for Course<'a> {
 impl Course<'_> {
     fn n_joints(&self) -> usize {
         self.extremes[0].len()
-    }
-
-    fn states(&self, times: &[f64]) -> JointStates {
-        match self.motion {
-            Motion::Series(series) => series.states(times),
-            Motion::Path(path) => path.states(times),
-        }
     }
 
     /// Halves what `open` (by the states at the middles) does not prove, until nothing is left: true; or until it says that
@@ -134,7 +125,7 @@ impl Course<'_> {
             let mut next = Vec::new();
             for stretches in stretches.chunks(TOGETHER) {
                 let times: Vec<f64> = stretches.iter().map(|s| s.middle).collect();
-                let Some(open) = open(&self.states(&times), stretches) else {
+                let Some(open) = open(&(self.states)(&times), stretches) else {
                     return false;
                 };
                 for (s, _) in stretches.iter().zip(open).filter(|(_, open)| *open) {

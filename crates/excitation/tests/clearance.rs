@@ -46,6 +46,16 @@ fn options(robot: &Robot) -> FourierOptions {
     }
 }
 
+/// Share of each joint's torque limit that `tau` of the links uses with friction, which may be against it.
+fn torque_use(robot: &Robot, tau: &[f64], s: &JointState) -> Vec<f64> {
+    let of_joint = |(j, joint): (usize, &idim_model::Joint)| {
+        let friction = joint.actuator.viscous_friction.unwrap_or(0.0) * s.qd[j];
+        let coulomb = joint.actuator.coulomb_friction.unwrap_or(0.0);
+        ((tau[j] + friction).abs() + coulomb) / joint.limits.torque.unwrap()
+    };
+    robot.joints().iter().enumerate().map(of_joint).collect()
+}
+
 /// The base parameters of a planar arm, and viscous friction.
 fn columns() -> Columns {
     use idim_model::ParameterKind::{Fv, MX, MY, ZZ};
@@ -93,11 +103,8 @@ fn identity_a_path_through_points_is_proved_where_it_keeps_clear_and_within_torq
         for k in 0..=n {
             let s = states.state(k);
             let tau = inverse_dynamics(&model, &inertial, &s);
-            for (j, joint) in robot.joints().iter().enumerate() {
-                let friction = joint.actuator.viscous_friction.unwrap_or(0.0) * s.qd[j];
-                let coulomb = joint.actuator.coulomb_friction.unwrap_or(0.0);
-                let here = ((tau[j] + friction).abs() + coulomb) / joint.limits.torque.unwrap();
-                used[j] = used[j].max(here);
+            for (used, here) in used.iter_mut().zip(torque_use(&robot, &tau, &s)) {
+                *used = used.max(here);
             }
         }
         let nearest = clearance.nearest(&states);
@@ -156,10 +163,7 @@ fn identity_a_motion_keeps_clear_and_within_torques_at_every_instant() {
     for k in 0..6000 {
         let s = states.state(k);
         let tau = inverse_dynamics(&model, &inertial, &s);
-        for (j, joint) in robot.joints().iter().enumerate() {
-            let friction = joint.actuator.viscous_friction.unwrap_or(0.0) * s.qd[j];
-            let coulomb = joint.actuator.coulomb_friction.unwrap_or(0.0);
-            let used = ((tau[j] + friction).abs() + coulomb) / joint.limits.torque.unwrap();
+        for (j, used) in torque_use(&robot, &tau, &s).into_iter().enumerate() {
             let bound = torque.joints[j].unwrap().bound;
             assert!(used <= bound && bound <= 0.8, "{used}, {bound}");
         }
